@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Output files that are whole or absent.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string_view>
+
+namespace fibrolite {
+
+/// Writes to a hidden file beside `target`; commit() flushes it to disk and renames it over the target. If it is destroyed
+/// uncommitted, nothing stays behind. Buffered. Not thread-safe.
+class OutputFile {
+ public:
+  /// @throws Error Io: folder missing or not writable.
+  explicit OutputFile(std::filesystem::path target);
+  ~OutputFile();
+  OutputFile(OutputFile&&) noexcept;
+  OutputFile& operator=(OutputFile&&) noexcept;
+
+  /// @throws Error Io: disk full or any other failure of the system.
+  void write(std::span<const std::byte> bytes);
+  void write(std::string_view text);
+  void commit();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Remove every uncommitted file of this process; for a signal handler's orderly end.
+void discard_uncommitted_files() noexcept;
+
+}  // namespace fibrolite

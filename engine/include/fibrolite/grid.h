@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a solid is sampled.
+#pragma once
+
+namespace fibrolite {
+
+/// Sample (i, j, k) lies at voxel_mm * (i, j, k) in world mm: every Grid of one voxel size shares one lattice.
+struct Grid {
+  double voxel_mm = 0.25;  ///< Voxel edge, mm; > 0.
+  float band_vox = 3;      ///< Half width of the narrow band, voxels; 2 or more.
+  friend constexpr bool operator==(const Grid&, const Grid&) = default;
+};
+
+}  // namespace fibrolite

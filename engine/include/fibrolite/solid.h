@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// A solid: a closed narrow-band signed distance grid (mm, negative inside). Immutable; copies are cheap.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "fibrolite/box.h"
+#include "fibrolite/grid.h"
+#include "fibrolite/shape.h"
+
+namespace fibrolite {
+
+class Solid {
+ public:
+  struct Impl;
+  Solid();  ///< The empty solid on a default grid.
+  explicit Solid(std::shared_ptr<const Impl> impl);
+
+  [[nodiscard]] Grid grid() const;
+  [[nodiscard]] bool empty() const;
+  /// World box of all samples inside (value < 0), mm. Cost: O(leaves).
+  [[nodiscard]] Box3d bounds_mm() const;
+  [[nodiscard]] std::int64_t active_voxels() const;
+  [[nodiscard]] std::int64_t memory_bytes() const;
+  /// Volume of { distance < 0 }, mm3: each sample counts with the fraction clamp(1/2 - d/voxel, 0, 1).
+  /// Error about (voxel/thickness)^2. Cost: O(active voxels), parallel; the same bits on any number of threads.
+  [[nodiscard]] double volume_mm3() const;
+  /// Trilinear distance at a world point, mm; +-(band) outside the band. Cost: O(1).
+  [[nodiscard]] float distance(Vec3d p) const;
+
+  [[nodiscard]] const Impl& impl() const { return *impl_; }
+  [[nodiscard]] std::shared_ptr<const Impl> share() const { return impl_; }
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// The solid's distance as a shape. A block on the solid's own lattice is copied, any other point is interpolated.
+[[nodiscard]] Shape distance_to(const Solid& solid);
+
+}  // namespace fibrolite

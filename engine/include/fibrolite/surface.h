@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Solid -> triangle mesh.
+#pragma once
+
+#include "fibrolite/context.h"
+#include "fibrolite/mesh.h"
+#include "fibrolite/solid.h"
+
+namespace fibrolite {
+
+struct SurfaceParams {
+  /// Move each vertex so that curved surfaces keep their volume (a mesh with its vertices on a convex surface lies inside it).
+  bool keep_volume = true;
+};
+/// Dual surface of the zero level: closed, 2-manifold, outward, no degenerate triangle, at float coordinates.
+/// Cost: O(active voxels), parallel; peaks at about twice the mesh. The same bits on any number of threads.
+/// @throws Error TooLarge (more than 2^32 - 1 vertices), Cancelled.
+[[nodiscard]] Mesh surface(const Solid& solid, const SurfaceParams& params = {}, const Context& context = {});
+
+}  // namespace fibrolite

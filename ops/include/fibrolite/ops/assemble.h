@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Shell, fills and joints as one composed shape.
+#pragma once
+
+#include <vector>
+
+#include "fibrolite/shape.h"
+
+namespace fibrolite {
+
+struct AssembleParams {
+  double shell_mm = 1.0;    ///< Outer wall; 2 voxels or more.
+  double overlap_mm = 0.3;  ///< Fills reach this far across part borders; 1 voxel or more.
+};
+struct FilledRegion {
+  Shape region;  ///< p_i.
+  Shape fill;    ///< Unclipped.
+};
+/// max(b, min(-(b + t), min_i max(fill_i, p_i - overlap), joints)). Conservative: zero set and sign are right.
+/// Source: algorithms of the project, docs/architecture.md.
+[[nodiscard]] Shape assemble(const Shape& body, const std::vector<FilledRegion>& parts, const std::vector<Shape>& joints,
+                             const AssembleParams& params);
+
+}  // namespace fibrolite

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The whole method on one screen.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/mesh.h"
+#include "fibrolite/ops/infill/infill.h"
+#include "fibrolite/ops/interfaces.h"
+#include "fibrolite/ops/joint.h"
+#include "fibrolite/ops/part.h"
+#include "fibrolite/ops/prepare.h"
+#include "fibrolite/ops/recipe.h"
+#include "fibrolite/ops/report.h"
+#include "fibrolite/solid.h"
+#include "fibrolite/solid_io.h"
+
+namespace fibrolite {
+
+struct HybridizeParams {
+  Recipe recipe;
+  InfillKind infill = InfillKind::Hybrid;
+  std::optional<double> voxel_mm;  ///< Default: min(longest side / 400, thinnest feature / 3).
+  bool steps = false;              ///< Also realize every step as a grid of its own.
+};
+struct Hybrid {
+  Solid solid;  ///< The printed solid.
+  Parts parts;
+  std::vector<Interface> interfaces;
+  std::vector<Joint> joints;
+  std::vector<NamedSolid> steps;  ///< body, shell, fill_<id>, layer_<n>, columns_<n>, solid; if asked for.
+  Shape body;                     ///< Distance to the model, for pictures.
+};
+/// Model -> printed solid. Fills in everything of `report` but the mesh block.
+/// @throws Error of every stage. Cost: see docs/performance.md.
+[[nodiscard]] Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report, const Context& context = {});
+
+/// The voxel a run will use, mm.
+[[nodiscard]] double choose_voxel(const Box3d& model, const Recipe& recipe, std::optional<double> wanted);
+/// Memory a run will need at most, bytes, predicted from area, volume and voxel before anything is allocated.
+[[nodiscard]] double predict_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill);
+
+}  // namespace fibrolite

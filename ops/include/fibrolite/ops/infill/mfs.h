@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Muscle fibre structure (paper Sec. 5.1).
+#pragma once
+
+#include <filesystem>
+#include <cstdint>
+#include <optional>
+
+#include "fibrolite/ops/fill.h"
+#include "fibrolite/ops/infill/micrograph.h"
+#include "fibrolite/ops/part.h"
+
+namespace fibrolite {
+
+/// Muscle fibres: voids packed side by side, separated by membranes that run along the column.
+struct MfsParams {
+  double fibre_mm = 2.4;  ///< Mean distance between fibre centres (void + wall); more than 2 * wall_mm.
+  double wall_mm = 0.8;   ///< Least membrane thickness; 2 voxels or more.
+  std::optional<std::filesystem::path> micrograph;  ///< Template image; default: the bundled one.
+  std::uint64_t seed = 1;
+};
+/// The membranes, unclipped: a 2-D distance image swept along the column's centre line with a rotation-minimising frame.
+/// `body` and `shell_mm` bound the lumen: narrower than two fibres becomes solid, with a warning.
+/// @throws Error BadRecipe (a range above), BadInput (unreadable template, or one without fibres). Cost: O(1) per point after
+/// setting up. Source: paper Sec. 5.1; sweep and distance image ours.
+[[nodiscard]] Fill generate(const Part& part, const MfsParams& params, const Shape& body, double shell_mm);
+
+}  // namespace fibrolite

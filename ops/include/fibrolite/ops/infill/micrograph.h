@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From a micrograph of muscle to a distance image of membranes (paper Sec. 5.1, Fig. 3).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "fibrolite/image.h"
+
+namespace fibrolite {
+
+/// Fibres found in a template image.
+struct FibreMap {
+  Image<std::int32_t> label;  ///< 0 = membrane, 1..fibres = fibre.
+  int fibres = 0;
+  double mean_pitch_px = 0;  ///< Mean distance between centres of neighbouring fibres.
+};
+/// Segment fibres by watershed (bright fibres, dark membranes, or the reverse: decided by which side is compact).
+/// @throws Error BadInput: fewer than 4 fibres found.
+[[nodiscard]] FibreMap find_fibres(const GrayImage& micrograph);
+
+/// Tile-free texture of fibres, larger than the template, by image quilting (Efros & Freeman 2001), rescaled so that fibres have the
+/// wanted pitch, as a 2-D signed distance to the membranes: mm, negative in the membrane, sub-pixel.
+struct MembraneImage {
+  FloatImage distance_mm;
+  double pixel_mm = 0.1;
+  [[nodiscard]] double width_mm() const { return distance_mm.width * pixel_mm; }
+  [[nodiscard]] double height_mm() const { return distance_mm.height * pixel_mm; }
+};
+struct MembraneParams {
+  double fibre_mm = 2.4, wall_mm = 0.8;
+  double width_mm = 10, height_mm = 10;  ///< Of the wanted section.
+  double pixel_mm = 0.1;                 ///< min(wall / 4, 0.1 mm) or finer.
+  std::uint64_t seed = 1;
+};
+[[nodiscard]] MembraneImage synthesize(const FibreMap& map, const MembraneParams& params);
+
+/// 8-bit gray image from a .png, .jpg, .tif, .bmp file. @throws Error BadInput.
+[[nodiscard]] GrayImage read_gray(const std::filesystem::path& path);
+/// The micrograph that comes with the project (installed asset, or the one in the source tree). @throws Error Internal if missing.
+[[nodiscard]] std::filesystem::path bundled_micrograph();
+
+}  // namespace fibrolite

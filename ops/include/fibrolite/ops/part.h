@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A verified part of the model. Only verify() makes one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fibrolite/ops/partition.h"
+#include "fibrolite/shape.h"
+
+namespace fibrolite {
+
+enum class Kind { Column, Bulk };
+[[nodiscard]] constexpr const char* name(Kind kind) { return kind == Kind::Column ? "column" : "bulk"; }
+
+/// Mean stress of a part in its own axis field, of the load case that decided, MPa.
+struct PartStress {
+  double axial = 0;
+  double transverse[2] = {0, 0};
+  double von_mises = 0;
+  double dominance = 0;  ///< |axial| / max |transverse|, the smallest over all load cases; 0 if unloaded.
+};
+
+class Part {
+ public:
+  [[nodiscard]] int id() const { return id_; }
+  [[nodiscard]] Kind kind() const { return kind_; }
+  [[nodiscard]] const Shape& region() const { return region_; }  ///< p_i of Labels::region().
+  [[nodiscard]] const Box3d& bounds_mm() const { return bounds_; }
+  [[nodiscard]] const Axis& axis() const { return axis_; }
+  [[nodiscard]] double diameter_mm() const { return diameter_; }
+  [[nodiscard]] double volume_mm3() const { return volume_; }  ///< On the proxy.
+  [[nodiscard]] Vec3d centroid_mm() const { return centroid_; }
+  [[nodiscard]] const PartStress& stress() const { return stress_; }
+  [[nodiscard]] const std::string& reason() const { return reason_; }
+
+ private:
+  friend class PartMaker;  // ops/src/verify.cpp alone defines it
+  Part() = default;
+  int id_ = 0;
+  Kind kind_ = Kind::Bulk;
+  Shape region_;
+  Box3d bounds_;
+  Axis axis_;
+  double diameter_ = 0, volume_ = 0;
+  Vec3d centroid_{};
+  PartStress stress_;
+  std::string reason_;
+};
+
+/// Every point of the body belongs to exactly one part; parts[i].id() == i.
+struct Parts {
+  std::vector<Part> parts;
+  Labels labels;          ///< By part id.
+  std::vector<Cut> cuts;  ///< Between different parts, by part id.
+};
+
+}  // namespace fibrolite

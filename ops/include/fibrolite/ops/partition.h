@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Partition by diameter (paper Sec. 4.1): candidates as functions of space, the same at every voxel size.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/ops/diameter.h"
+#include "fibrolite/shape.h"
+
+namespace fibrolite {
+
+/// A plane cut between two candidates: a disc in the xy plane of `frame`, whose z axis points from `a` into `b`.
+struct Cut {
+  int a = 0, b = 0;
+  Frame frame;
+  double radius_mm = 0;  ///< Of the disc about frame.origin that covers the section.
+};
+
+/// The axis of a limb: a unit field and a centre line, from its interface (or one end) to its tip.
+class Axis {
+ public:
+  struct Impl;
+  Axis();  ///< A straight axis along z.
+  explicit Axis(std::shared_ptr<const Impl> impl);
+  /// A straight axis.
+  static Axis straight(Vec3d from, Vec3d to);
+  /// A centre line through `points` (at least two); the field is its tangent at the nearest point.
+  static Axis along(std::vector<Vec3d> points);
+  /// Unit tangent t(x). Cost: O(points of the line).
+  [[nodiscard]] Vec3d tangent(Vec3d p) const;
+  /// Smooth, evenly spaced, turning so gently that normal planes do not cross inside the limb.
+  [[nodiscard]] const std::vector<Vec3d>& centre_line() const;
+  [[nodiscard]] double length_mm() const;
+  /// Mean direction, unit.
+  [[nodiscard]] Vec3d mean() const;
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// Which candidate owns a point. Immutable, thread-safe, cheap to copy.
+class Labels {
+ public:
+  struct Impl;
+  Labels();  ///< One candidate, 0, owns everything.
+  explicit Labels(std::shared_ptr<const Impl> impl);
+  [[nodiscard]] int count() const;
+  /// In [0, count). Every point of space has exactly one owner. Cost: O(cuts nearby).
+  [[nodiscard]] int label(Vec3d p) const;
+  /// p_i: negative inside part i, the exact plane distance near a cut, clamped far from one.
+  [[nodiscard]] Shape region(int i) const;
+  /// The same points, candidates renamed by `part_of_candidate` (several may get one name; borders between them vanish).
+  [[nodiscard]] Labels merged(const std::vector<int>& part_of_candidate) const;
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+struct Candidate {
+  int id = 0;
+  bool column_like = false;  ///< Below the threshold and longer than wide; else bulk.
+  double volume_mm3 = 0;     ///< On the proxy.
+  Vec3d centroid_mm{};
+  double diameter_mm = 0;  ///< Median diameter of its faces.
+  double length_mm = 0;    ///< Along the axis.
+  Axis axis;
+  std::string reason;  ///< Why column-like or not, in words with numbers.
+};
+
+struct PartitionParams {
+  std::optional<double> threshold;  ///< nsdf below this is column-like, 0 to 1; absent: auto, the most stable partition.
+  double min_area = 0.012;          ///< Regions below this share of the surface join a neighbour; 0 to 0.5.
+  double min_slenderness = 1.0;     ///< A limb shorter than this many diameters is no column.
+};
+struct Partition {
+  std::vector<Candidate> candidates;  ///< Sorted by id; at least one.
+  std::vector<Cut> cuts;
+  Labels labels;
+  double threshold = 0;                ///< The one used.
+  double stable_from = 0, stable_to = 0;  ///< Range of thresholds that give the same partition (auto only).
+  std::vector<std::string> notes;
+};
+/// @throws Error BadRecipe (a range above). Cost: a few seconds for 15 k faces. Source: paper Sec. 4.1; choice of threshold ours.
+[[nodiscard]] Partition partition(const Proxy& proxy, const DiameterField& field, const PartitionParams& params = {},
+                                  const Context& context = {});
+
+}  // namespace fibrolite

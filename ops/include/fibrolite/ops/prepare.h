@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// From what a file holds to an oriented model in mm, with everything that was mended said in words.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/mesh.h"
+#include "fibrolite/mesh_io.h"
+
+namespace fibrolite {
+
+enum class Up { X, Y, Z, MinusX, MinusY, MinusZ };
+/// The unit vector of an Up.
+[[nodiscard]] Vec3d direction(Up up);
+
+struct PrepareParams {
+  std::optional<double> size_mm;  ///< Scale so that the longest side has this length; > 0.
+  std::optional<double> unit_mm;  ///< Millimetres per file unit; > 0. Default: what the file says, else 1.
+};
+struct Model {
+  Mesh mesh;                          ///< Welded, outward by signed volume, mm.
+  std::vector<std::string> repairs;   ///< E.g. "turned inside out", "12 duplicate triangles dropped".
+  std::vector<std::string> warnings;  ///< E.g. the units warning (longest side under 5 mm or over 2 m).
+};
+/// Scale, weld equal corners, drop zero-area and duplicate triangles, orient each component consistently where it can be, and the
+/// whole by signed volume. Holes and self-intersections stay: to_solid() decides the inside by winding number.
+/// @throws Error BadInput: no triangles left, all in one plane; BadRecipe: a range above.
+[[nodiscard]] Model prepare(const MeshFile& file, const PrepareParams& params, const Context& context = {});
+
+}  // namespace fibrolite

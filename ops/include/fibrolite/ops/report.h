@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Everything measured in a run: report.json, schema 1.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fibrolite/mesh.h"
+#include "fibrolite/ops/recipe.h"
+
+namespace fibrolite {
+
+struct PartReport {
+  int id = 0;
+  std::string kind, infill;
+  double volume_mm3 = 0;         ///< Of the part of the body, on the fine grid.
+  double lumen_mm3 = 0;          ///< Inside the shell.
+  double infill_volume_mm3 = 0;  ///< Material in the lumen.
+  int fibres = 0;
+  Vec3d centroid_mm{}, axis{};
+  double diameter_mm = 0;
+  PartStress stress;
+  std::string reason;
+};
+struct InterfaceReport {
+  int a = 0, b = 0;
+  Vec3d centroid_mm{}, normal{};
+  double area_mm2 = 0;
+  int regions_before = 0, regions_after = 0, columns = 0, columns_dropped = 0;
+  double layer_area_mm2 = 0, union_area_mm2 = 0, bridge_area_mm2 = 0, contact_area_mm2 = 0;
+};
+struct SolidReport {
+  double volume_mm3 = 0, fill_ratio = 0, mass_g = 0;
+  std::int64_t pieces = 0, cavities = 0;
+  double cavity_volume_mm3 = 0;
+  std::int64_t ties = 0;            ///< Struts added to loose pieces.
+  std::int64_t specks_removed = 0;  ///< Loose pieces of a few voxels.
+  std::int64_t voids_filled = 0;    ///< Micro-voids.
+  std::int64_t dangling = 0, unreached = 0, active_voxels = 0;
+  double voxel_mm = 0;
+};
+struct StageReport {
+  std::string name;
+  double wall_s = 0, cpu_s = 0, peak_rss_mb = 0;
+};
+struct ModelReport {
+  std::string path;
+  std::int64_t triangles = 0;
+  Vec3d size_mm{};
+  double volume_mm3 = 0;
+  std::vector<std::string> repairs;
+};
+struct Report {
+  std::string command;
+  Recipe recipe;
+  std::string infill = "hybrid";
+  ModelReport model;
+  double threshold = 0, stable_from = 0, stable_to = 0;
+  std::vector<PartReport> parts;
+  std::vector<InterfaceReport> interfaces;
+  SolidReport solid;
+  MeshCheck mesh;
+  std::vector<StageReport> stages;
+  std::vector<std::string> warnings;
+};
+/// Schema 1, pretty, keys in a fixed order; no NaN or infinity ever (null instead).
+[[nodiscard]] std::string to_json(const Report& report);
+/// The "mesh" block alone, with size and closedness, for `fibrolite check`.
+[[nodiscard]] std::string version();
+
+/// Measures wall, CPU and peak memory of named stages.
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::vector<StageReport>& out) : out_(&out) {}
+  /// Run `work` as the stage `name`.
+  template <class Work>
+  auto operator()(const char* name, Work&& work) {
+    Lap lap(*out_, name);
+    return work();
+  }
+
+ private:
+  struct Lap {
+    Lap(std::vector<StageReport>& out, const char* name);
+    ~Lap();
+    Lap(const Lap&) = delete;
+    Lap& operator=(const Lap&) = delete;
+    std::vector<StageReport>* out;
+    const char* name;
+    double wall0, cpu0;
+  };
+  std::vector<StageReport>* out_;
+};
+
+}  // namespace fibrolite
