@@ -1,1 +1,194 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "fibrolite/solid.h"
+
+#include <openvdb/tools/Interpolation.h>
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "fibrolite/error.h"
+#include "fibrolite/vdb.h"
+#include "vdb_access.h"
+
+namespace fibrolite {
+namespace {
+
+using Tree = openvdb::FloatTree;
+using Leaf = Tree::LeafNodeType;
+
+Vec3d sample_mm(const openvdb::Coord& ijk, double voxel) {
+  return voxel * Vec3d{1.0 * ijk.x(), 1.0 * ijk.y(), 1.0 * ijk.z()};
+}
+
+struct SolidDistance final : Shape::Function {
+  explicit SolidDistance(Solid s) : solid(std::move(s)) {}
+
+  void evaluate(const PointBlock& block, float* out) const override {
+    const Solid::Impl& impl = solid.impl();
+    const Tree& tree = impl.grid->tree();
+    if (block.leaf != nullptr && block.voxel_mm == impl.spec.voxel_mm) {
+      const openvdb::Coord origin(block.leaf->x, block.leaf->y, block.leaf->z);
+      if (const Leaf* leaf = tree.probeConstLeaf(origin)) {
+        std::memcpy(out, leaf->buffer().data(), sizeof(float) * Leaf::SIZE);
+      } else {
+        std::fill_n(out, block.count, tree.getValue(origin));
+      }
+      return;
+    }
+    const auto access = impl.grid->getConstUnsafeAccessor();
+    const double scale = 1.0 / impl.spec.voxel_mm;
+    for (int i = 0; i < block.count; ++i) {
+      out[i] = openvdb::tools::BoxSampler::sample(
+          access, openvdb::Vec3d(block.x[i] * scale, block.y[i] * scale, block.z[i] * scale));
+    }
+  }
+
+  /// From the tree's topology: exact for boxes inside one leaf or tile, else from the samples that touch the box.
+  [[nodiscard]] Interval bound(const Box3d& box) const override {
+    const Solid::Impl& impl = solid.impl();
+    const Tree& tree = impl.grid->tree();
+    const double h = impl.spec.voxel_mm;
+    const auto low = [&](double v) { return static_cast<int>(std::floor(v / h + 1e-4)); };
+    const auto high = [&](double v) { return static_cast<int>(std::ceil(v / h - 1e-4)); };
+    const openvdb::CoordBBox samples(openvdb::Coord(low(box.min.x), low(box.min.y), low(box.min.z)),
+                                     openvdb::Coord(high(box.max.x), high(box.max.y), high(box.max.z)));
+    Interval result{far_mm, -far_mm};
+    const auto take = [&](float lo, float hi) { result = {std::min(result.lo, lo), std::max(result.hi, hi)}; };
+    if (samples.volume() > 4096UL * 512UL) {  // many leaves: say nothing sharper than 1-Lipschitz allows
+      return Function::bound(box).lo > 0 ? Function::bound(box) : Interval{-far_mm, far_mm};
+    }
+    const openvdb::Coord first = samples.min() & ~7;
+    for (int x = first.x(); x <= samples.max().x(); x += 8) {
+      for (int y = first.y(); y <= samples.max().y(); y += 8) {
+        for (int z = first.z(); z <= samples.max().z(); z += 8) {
+          const openvdb::Coord at(x, y, z);
+          if (const Leaf* leaf = tree.probeConstLeaf(at)) {
+            const float* values = leaf->buffer().data();
+            const auto [lo, hi] = std::minmax_element(values, values + Leaf::SIZE);
+            take(*lo, *hi);
+          } else {
+            const float v = tree.getValue(at);
+            take(v, v);
+          }
+        }
+      }
+    }
+    return result;
+  }
+
+  Solid solid;
+};
+
+}  // namespace
+
+void initialize_openvdb() {
+  static std::once_flag once;
+  std::call_once(once, [] { openvdb::initialize(); });
+}
+
+openvdb::FloatGrid::Ptr make_grid(Grid spec) {
+  if (!(spec.voxel_mm > 0) || !std::isfinite(spec.voxel_mm) || !(spec.band_vox >= 2)) {
+    throw Error(Code::BadRecipe, "a grid needs a positive voxel and a band of 2 voxels or more", "voxel");
+  }
+  initialize_openvdb();
+  auto grid = openvdb::FloatGrid::create(static_cast<float>(spec.voxel_mm) * spec.band_vox);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(spec.voxel_mm));
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  return grid;
+}
+
+Solid make_solid(openvdb::FloatGrid::ConstPtr grid, Grid spec) {
+  return Solid(std::make_shared<const Solid::Impl>(Solid::Impl{std::move(grid), spec}));
+}
+
+Solid::Solid() : Solid(make_solid(make_grid({}), {})) {}
+Solid::Solid(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+
+Grid Solid::grid() const { return impl_->spec; }
+bool Solid::empty() const { return impl_->grid->empty(); }
+std::int64_t Solid::active_voxels() const { return static_cast<std::int64_t>(impl_->grid->activeVoxelCount()); }
+std::int64_t Solid::memory_bytes() const { return static_cast<std::int64_t>(impl_->grid->memUsage()); }
+
+Box3d Solid::bounds_mm() const {
+  Box3d box;
+  const double h = impl_->spec.voxel_mm;
+  const Tree& tree = impl_->grid->tree();
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const openvdb::Coord o = leaf->origin();
+    if (box.contains(sample_mm(o, h)) && box.contains(sample_mm(o.offsetBy(7), h))) continue;
+    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+      if (leaf->getValue(i) < 0) box.include(sample_mm(leaf->offsetToGlobalCoord(i), h));
+    }
+  }
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    if (*tile >= 0) continue;
+    const openvdb::CoordBBox b = tile.getBoundingBox();
+    box.include(sample_mm(b.min(), h));
+    box.include(sample_mm(b.max(), h));
+  }
+  return box;
+}
+
+double Solid::volume_mm3() const {
+  const double h = impl_->spec.voxel_mm;
+  const Tree& tree = impl_->grid->tree();
+  const openvdb::tree::LeafManager<const Tree> leaves(tree);
+  // One number per leaf, summed in order: the same bits on any number of threads.
+  std::vector<double> part(leaves.leafCount(), 0.0);
+  const auto inverse = static_cast<float>(1.0 / h);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size()), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const float* v = leaves.leaf(i).buffer().data();
+      double sum = 0;
+      for (openvdb::Index k = 0; k < Leaf::SIZE; ++k) sum += std::clamp(0.5F - v[k] * inverse, 0.0F, 1.0F);
+      part[i] = sum;
+    }
+  });
+  double voxels = 0;
+  for (const double v : part) voxels += v;
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    if (*tile < 0) voxels += static_cast<double>(tile.getVoxelCount());
+  }
+  return voxels * h * h * h;
+}
+
+float Solid::distance(Vec3d p) const {
+  const double scale = 1.0 / impl_->spec.voxel_mm;
+  return openvdb::tools::BoxSampler::sample(impl_->grid->tree(), openvdb::Vec3d(p.x * scale, p.y * scale, p.z * scale));
+}
+
+Shape distance_to(const Solid& solid) { return Shape(std::make_shared<const SolidDistance>(solid)); }
+
+openvdb::FloatGrid::ConstPtr to_vdb(const Solid& solid) { return solid.impl().grid; }
+
+Solid from_vdb(const openvdb::FloatGrid::ConstPtr& grid) {
+  if (grid == nullptr) throw Error(Code::BadInput, "no grid given");
+  const auto voxel = grid->voxelSize();
+  const openvdb::Vec3d at = grid->indexToWorld(openvdb::Vec3d(0.0));
+  const bool uniform =
+      std::abs(voxel.x() - voxel.y()) < 1e-9 * voxel.x() && std::abs(voxel.x() - voxel.z()) < 1e-9 * voxel.x();
+  if (!uniform || !grid->transform().isLinear()) {
+    throw Error(Code::BadInput, "the grid's voxels are not uniform cubes", grid->getName(), "resample it first");
+  }
+  if (at.length() > 1e-6 * voxel.x()) {
+    throw Error(Code::BadInput, "the grid's lattice does not pass through the world origin", grid->getName(),
+                "resample it first");
+  }
+  if (!(grid->background() > 0)) {
+    throw Error(Code::BadInput, "the grid is no level set: its background is not positive", grid->getName());
+  }
+  return make_solid(grid, {voxel.x(), static_cast<float>(grid->background() / voxel.x())});
+}
+
+}  // namespace fibrolite

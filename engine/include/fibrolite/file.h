@@ -10,8 +10,8 @@
 
 namespace fibrolite {
 
-/// Writes to a hidden file beside `target`; commit() flushes it to disk and renames it over the target. If it is destroyed
-/// uncommitted, nothing stays behind. Buffered. Not thread-safe.
+/// Writes to a hidden file beside `target`; commit() flushes it to disk and renames it over the target. If it is
+/// destroyed uncommitted, nothing stays behind. Buffered. Not thread-safe.
 class OutputFile {
  public:
   /// @throws Error Io: folder missing or not writable.

@@ -14,9 +14,7 @@ struct Frame {
     const Vec3d d = p - origin;
     return {dot(d, x), dot(d, y), dot(d, z)};
   }
-  [[nodiscard]] constexpr Vec3d to_world(Vec3d p) const {
-    return origin + p.x * x + p.y * y + p.z * z;
-  }
+  [[nodiscard]] constexpr Vec3d to_world(Vec3d p) const { return origin + p.x * x + p.y * y + p.z * z; }
 };
 
 /// A frame whose z axis is `z` (any length but zero). The choice of x is deterministic: it is built from the

@@ -17,17 +17,17 @@ namespace fibrolite {
 
 /// What came with a file beside its triangles.
 struct MeshFile {
-  Mesh mesh;                ///< Polygons are split into fans; STL corners are not welded yet. Units as in the file.
-  double unit_mm = 1.0;     ///< Millimetres per file unit; known for .3mf only, else 1.
+  Mesh mesh;             ///< Polygons are split into fans; STL corners are not welded yet. Units as in the file.
+  double unit_mm = 1.0;  ///< Millimetres per file unit; known for .3mf only, else 1.
   std::vector<std::string> notes;  ///< E.g. "3 polygons with fewer than 3 corners left out".
 };
 
-/// @throws Error BadInput: missing or empty file, not the format its ending says, truncated, an index out of range, NaN or
-/// infinite coordinates, no triangles; Unsupported: unknown ending. The message names the place (line, byte, face).
+/// @throws Error BadInput: missing or empty file, not the format its ending says, truncated, an index out of range, NaN
+/// or infinite coordinates, no triangles; Unsupported: unknown ending. The message names the place (line, byte, face).
 [[nodiscard]] MeshFile read_mesh(const std::filesystem::path& path, const Context& context = {});
 
-/// The file is whole or absent: written beside its target, flushed, renamed. Coordinates are written so that they read back to
-/// the same floats. The same mesh gives the same bytes (3MF UUIDs are fixed).
+/// The file is whole or absent: written beside its target, flushed, renamed. Coordinates are written so that they read
+/// back to the same floats. The same mesh gives the same bytes (3MF UUIDs are fixed).
 /// @throws Error Io: folder missing, not writable, disk full; Unsupported: unknown ending.
 void write_mesh(const std::filesystem::path& path, const Mesh& mesh, const Context& context = {});
 

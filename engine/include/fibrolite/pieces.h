@@ -39,8 +39,8 @@ struct CleanResult {
 struct Gap {
   Vec3d from_mm, to_mm;
 };
-/// For each loose piece (all but the largest): the shortest found straight gap to material of another piece, through void,
-/// searched within `reach_mm`. Pieces with none are left out. Cost: O(loose voxels * reach^2) at worst.
+/// For each loose piece (all but the largest): the shortest found straight gap to material of another piece, through
+/// void, searched within `reach_mm`. Pieces with none are left out. Cost: O(loose voxels * reach^2) at worst.
 [[nodiscard]] std::vector<Gap> gaps(const Solid& solid, double reach_mm, const Context& context = {});
 
 }  // namespace fibrolite

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shape: a distance *function* (mm, negative inside). Pure, thread-safe, no voxels of its own. Evaluated a block of points
-// at a time, with a bound that lets a block be skipped. Composed values keep zero set and sign; their magnitude is at most
-// the distance.
+// A shape: a distance *function* (mm, negative inside). Pure, thread-safe, no voxels of its own. Evaluated a block of
+// points at a time, with a bound that lets a block be skipped. Composed values keep zero set and sign; their magnitude
+// is at most the distance.
 #pragma once
 
 #include <memory>

@@ -18,7 +18,8 @@ struct NamedSolid {
 };
 /// Voxel count, bounding box and a checksum are stored as metadata. @throws Error Io.
 void write_vdb(const std::filesystem::path& path, const std::vector<NamedSolid>& solids, const Context& context = {});
-/// The first float level-set grid (or the one called `name`). @throws Error BadInput: missing, truncated, damaged, no level set.
+/// The first float level-set grid (or the one called `name`). @throws Error BadInput: missing, truncated, damaged, no
+/// level set.
 [[nodiscard]] Solid read_vdb(const std::filesystem::path& path, const std::string& name = {});
 
 }  // namespace fibrolite

@@ -9,7 +9,8 @@
 namespace fibrolite {
 
 struct SurfaceParams {
-  /// Move each vertex so that curved surfaces keep their volume (a mesh with its vertices on a convex surface lies inside it).
+  /// Move each vertex so that curved surfaces keep their volume (a mesh with its vertices on a convex surface lies
+  /// inside it).
   bool keep_volume = true;
 };
 /// Dual surface of the zero level: closed, 2-manifold, outward, no degenerate triangle, at float coordinates.

@@ -31,8 +31,8 @@ class WindingTree {
   std::shared_ptr<const Impl> impl_;
 };
 
-/// Exact signed distance to a mesh, independent of any grid: |nearest|, sign by winding number > 1/2. Slow (about 5 us per
-/// point): for sections and tests, not for filling grids.
+/// Exact signed distance to a mesh, independent of any grid: |nearest|, sign by winding number > 1/2. Slow (about 5 us
+/// per point): for sections and tests, not for filling grids.
 [[nodiscard]] Shape distance_to(const WindingTree& tree);
 
 }  // namespace fibrolite

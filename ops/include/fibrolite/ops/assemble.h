@@ -18,7 +18,7 @@ struct FilledRegion {
 };
 /// max(b, min(-(b + t), min_i max(fill_i, p_i - overlap), joints)). Conservative: zero set and sign are right.
 /// Source: algorithms of the project, docs/architecture.md.
-[[nodiscard]] Shape assemble(const Shape& body, const std::vector<FilledRegion>& parts, const std::vector<Shape>& joints,
-                             const AssembleParams& params);
+[[nodiscard]] Shape assemble(const Shape& body, const std::vector<FilledRegion>& parts,
+                             const std::vector<Shape>& joints, const AssembleParams& params);
 
 }  // namespace fibrolite

@@ -31,7 +31,9 @@ struct DiameterField {
   std::vector<double> diameter_mm;  ///< One per face of the surface, smoothed.
   std::vector<double> normalized;   ///< nsdf in [0, 1], paper Sec. 4.1.
 };
-/// @throws Error BadInput: empty or open surface. Cost: about 0.1 ms per face. Source: Shapira et al. 2008; CGAL's sdf_values.
-[[nodiscard]] DiameterField diameter(const Mesh& surface, const DiameterParams& params = {}, const Context& context = {});
+/// @throws Error BadInput: empty or open surface. Cost: about 0.1 ms per face. Source: Shapira et al. 2008; CGAL's
+/// sdf_values.
+[[nodiscard]] DiameterField diameter(const Mesh& surface, const DiameterParams& params = {},
+                                     const Context& context = {});
 
 }  // namespace fibrolite

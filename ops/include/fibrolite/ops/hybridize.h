@@ -35,7 +35,8 @@ struct Hybrid {
 };
 /// Model -> printed solid. Fills in everything of `report` but the mesh block.
 /// @throws Error of every stage. Cost: see docs/performance.md.
-[[nodiscard]] Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report, const Context& context = {});
+[[nodiscard]] Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report,
+                               const Context& context = {});
 
 /// The voxel a run will use, mm.
 [[nodiscard]] double choose_voxel(const Box3d& model, const Recipe& recipe, std::optional<double> wanted);

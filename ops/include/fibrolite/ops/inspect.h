@@ -17,7 +17,8 @@ struct Inspection {
   std::int64_t self_intersections = 0;  ///< Pairs of triangles that meet other than in a shared corner or edge.
 };
 [[nodiscard]] Inspection inspect(const Mesh& mesh, const Context& context = {});
-/// JSON: "mesh" block, volume_mm3, size_mm, closed, self_intersections. Reads .stl .obj .ply .off .3mf, or a .vdb (its surface).
+/// JSON: "mesh" block, volume_mm3, size_mm, closed, self_intersections. Reads .stl .obj .ply .off .3mf, or a .vdb (its
+/// surface).
 [[nodiscard]] std::string inspect_file(const std::filesystem::path& path, const Context& context = {});
 
 }  // namespace fibrolite

@@ -12,10 +12,10 @@ namespace fibrolite {
 
 /// One connected section of the body in a cut plane between two parts.
 struct Interface {
-  int a = 0, b = 0;     ///< Part ids; the frame's z axis points from a into b. If one is a column, it is a.
-  Frame frame;          ///< Origin at the section's centroid.
-  double radius_mm = 0; ///< Of the disc that covers the section.
-  double area_mm2 = 0;  ///< Of the body's section.
+  int a = 0, b = 0;      ///< Part ids; the frame's z axis points from a into b. If one is a column, it is a.
+  Frame frame;           ///< Origin at the section's centroid.
+  double radius_mm = 0;  ///< Of the disc that covers the section.
+  double area_mm2 = 0;   ///< Of the body's section.
 };
 /// `body` must not depend on the voxel (distance to the mesh). Sampled at `pixel_mm`. Sorted by (a, b, centroid).
 [[nodiscard]] std::vector<Interface> interfaces(const Parts& parts, const Shape& body, double pixel_mm,

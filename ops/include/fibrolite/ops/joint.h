@@ -18,11 +18,11 @@ enum class Bridge { Mst, Bbox };  ///< Ours: minimum spanning tree of bridges; t
 struct JointParams {
   bool enabled = true;
   Bridge bridge = Bridge::Mst;
-  double layer_mm = 1.2;    ///< Thickness of the transient layer (half in each part); 2 voxels or more.
-  double column_mm = 0.8;   ///< Diameter of a support column; 2 voxels or more.
-  double spacing_mm = 3.0;  ///< Poisson-disk distance between support columns; more than column_mm.
-  double reach_mm = 12;     ///< A column that meets no crystal within this is dropped (2 cells).
-  double min_wall_mm = 0.8; ///< Width of a bridge.
+  double layer_mm = 1.2;     ///< Thickness of the transient layer (half in each part); 2 voxels or more.
+  double column_mm = 0.8;    ///< Diameter of a support column; 2 voxels or more.
+  double spacing_mm = 3.0;   ///< Poisson-disk distance between support columns; more than column_mm.
+  double reach_mm = 12;      ///< A column that meets no crystal within this is dropped (2 cells).
+  double min_wall_mm = 0.8;  ///< Width of a bridge.
 };
 
 /// The transient layer as a binary section image in the interface's frame (paper Sec. 6.1), and how it was joined.
@@ -33,27 +33,28 @@ struct Layer {
   int regions_before = 0, regions_after = 0;
   double union_area_mm2 = 0, bridge_area_mm2 = 0;
 };
-/// Number of connected (8-neighbour) material regions of a layer: the connectivity check. A joint is sound iff this is 1.
+/// Number of connected (8-neighbour) material regions of a layer: the connectivity check. A joint is sound iff this
+/// is 1.
 [[nodiscard]] int regions(const Layer& layer);
 
 /// US = S_a | S_b | shell ring inside the body's section, then bridges until one region is left.
 /// `fill_a`, `fill_b`: unclipped structures; `body`: distance to the mesh; shell ring = { -shell_mm <= body <= 0 }.
-[[nodiscard]] Layer transient_layer(const Interface& interface, const Shape& fill_a, const Shape& fill_b, const Shape& body,
-                                    double shell_mm, double pixel_mm, const JointParams& params);
+[[nodiscard]] Layer transient_layer(const Interface& interface, const Shape& fill_a, const Shape& fill_b,
+                                    const Shape& body, double shell_mm, double pixel_mm, const JointParams& params);
 
 struct Joint {
   Shape shape;  ///< Layer and columns, unclipped by the body.
   Layer layer;
   std::vector<Capsule> columns;
-  int columns_dropped = 0;     ///< Found no crystal within reach.
-  double contact_area_mm2 = 0; ///< Material of the layer that touches structure b (crystal), columns included.
+  int columns_dropped = 0;      ///< Found no crystal within reach.
+  double contact_area_mm2 = 0;  ///< Material of the layer that touches structure b (crystal), columns included.
   std::vector<std::string> warnings;
 };
-/// Support columns run along the interface's normal from the layer into each side's crystal (`crystal_a`, `crystal_b`: whether that
-/// side's fill is made of sticks). `stick_mm`: stick diameter, how deep a column must end in material.
+/// Support columns run along the interface's normal from the layer into each side's crystal (`crystal_a`, `crystal_b`:
+/// whether that side's fill is made of sticks). `stick_mm`: stick diameter, how deep a column must end in material.
 /// Random numbers: hash(seed, "joint", index). Cost: O(section pixels). Source: paper Sec. 6.
-[[nodiscard]] Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b, bool crystal_a, bool crystal_b,
-                         double stick_mm, const Shape& body, double shell_mm, std::uint64_t seed, int index,
-                         const JointParams& params, const Context& context = {});
+[[nodiscard]] Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b, bool crystal_a,
+                         bool crystal_b, double stick_mm, const Shape& body, double shell_mm, std::uint64_t seed,
+                         int index, const JointParams& params, const Context& context = {});
 
 }  // namespace fibrolite

@@ -53,7 +53,8 @@ class Labels {
   [[nodiscard]] int label(Vec3d p) const;
   /// p_i: negative inside part i, the exact plane distance near a cut, clamped far from one.
   [[nodiscard]] Shape region(int i) const;
-  /// The same points, candidates renamed by `part_of_candidate` (several may get one name; borders between them vanish).
+  /// The same points, candidates renamed by `part_of_candidate` (several may get one name; borders between them
+  /// vanish).
   [[nodiscard]] Labels merged(const std::vector<int>& part_of_candidate) const;
 
  private:
@@ -72,19 +73,21 @@ struct Candidate {
 };
 
 struct PartitionParams {
-  std::optional<double> threshold;  ///< nsdf below this is column-like, 0 to 1; absent: auto, the most stable partition.
-  double min_area = 0.012;          ///< Regions below this share of the surface join a neighbour; 0 to 0.5.
-  double min_slenderness = 1.0;     ///< A limb shorter than this many diameters is no column.
+  std::optional<double>
+      threshold;                 ///< nsdf below this is column-like, 0 to 1; absent: auto, the most stable partition.
+  double min_area = 0.012;       ///< Regions below this share of the surface join a neighbour; 0 to 0.5.
+  double min_slenderness = 1.0;  ///< A limb shorter than this many diameters is no column.
 };
 struct Partition {
   std::vector<Candidate> candidates;  ///< Sorted by id; at least one.
   std::vector<Cut> cuts;
   Labels labels;
-  double threshold = 0;                ///< The one used.
+  double threshold = 0;                   ///< The one used.
   double stable_from = 0, stable_to = 0;  ///< Range of thresholds that give the same partition (auto only).
   std::vector<std::string> notes;
 };
-/// @throws Error BadRecipe (a range above). Cost: a few seconds for 15 k faces. Source: paper Sec. 4.1; choice of threshold ours.
+/// @throws Error BadRecipe (a range above). Cost: a few seconds for 15 k faces. Source: paper Sec. 4.1; choice of
+/// threshold ours.
 [[nodiscard]] Partition partition(const Proxy& proxy, const DiameterField& field, const PartitionParams& params = {},
                                   const Context& context = {});
 

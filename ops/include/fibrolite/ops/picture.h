@@ -17,18 +17,18 @@ namespace fibrolite {
 struct PictureParams {
   int width_px = 1600, height_px = 1200;  ///< 16 to 8192.
   Vec3d up{0, 0, 1};                      ///< Unit.
-  /// Cut plane: material on the side the normal points to is taken away. Default: through the middle of the model, across its
-  /// smallest horizontal extent, seen from the open side.
+  /// Cut plane: material on the side the normal points to is taken away. Default: through the middle of the model,
+  /// across its smallest horizontal extent, seen from the open side.
   std::optional<Vec3d> cut_point, cut_normal;
   bool cut = true;
 };
 /// Colour of the material at a point (by part, shell, joint).
 using PointColor = std::function<Rgb(Vec3d)>;
 
-/// Render the surface of `solid` with everything in front of the cut plane taken away, the cut face filled where the solid is.
-/// Cost: seconds for millions of triangles. The same bytes on any number of threads.
-[[nodiscard]] RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& color, const PictureParams& params = {},
-                               const Context& context = {});
+/// Render the surface of `solid` with everything in front of the cut plane taken away, the cut face filled where the
+/// solid is. Cost: seconds for millions of triangles. The same bytes on any number of threads.
+[[nodiscard]] RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& color,
+                               const PictureParams& params = {}, const Context& context = {});
 /// PNG, whole or absent. @throws Error Io.
 void write_png(const std::filesystem::path& path, const RgbImage& image);
 

@@ -25,8 +25,9 @@ struct Model {
   std::vector<std::string> repairs;   ///< E.g. "turned inside out", "12 duplicate triangles dropped".
   std::vector<std::string> warnings;  ///< E.g. the units warning (longest side under 5 mm or over 2 m).
 };
-/// Scale, weld equal corners, drop zero-area and duplicate triangles, orient each component consistently where it can be, and the
-/// whole by signed volume. Holes and self-intersections stay: to_solid() decides the inside by winding number.
+/// Scale, weld equal corners, drop zero-area and duplicate triangles, orient each component consistently where it can
+/// be, and the whole by signed volume. Holes and self-intersections stay: to_solid() decides the inside by winding
+/// number.
 /// @throws Error BadInput: no triangles left, all in one plane; BadRecipe: a range above.
 [[nodiscard]] Model prepare(const MeshFile& file, const PrepareParams& params, const Context& context = {});
 

@@ -18,8 +18,8 @@ struct TetrahedralizeParams {
   int cpu_limit_s = 60;        ///< The child is ended after this.
   int memory_limit_mb = 4096;  ///< The child gets no more than this.
 };
-/// Ten-node tetrahedra of the volume inside a closed surface. The answer is checked: tets > 0, all positively oriented, volume within
-/// 0.1 % of the surface's. @throws Error SolverFailed, Cancelled.
+/// Ten-node tetrahedra of the volume inside a closed surface. The answer is checked: tets > 0, all positively oriented,
+/// volume within 0.1 % of the surface's. @throws Error SolverFailed, Cancelled.
 [[nodiscard]] TetMesh tetrahedralize(const Mesh& closed_surface, const TetrahedralizeParams& params = {},
                                      const Context& context = {});
 
@@ -28,12 +28,12 @@ struct TetrahedralizeParams {
 [[nodiscard]] std::filesystem::path tetgen_program();
 
 struct ExtractParams {
-  double voxel_mm = 0;              ///< Of the surface that is simplified; 0: the proxy's.
-  int max_surface_triangles = 6000; ///< Aim of the simplification.
-  double max_distance_vox = 0.5;    ///< Bound of the simplification, voxels.
+  double voxel_mm = 0;               ///< Of the surface that is simplified; 0: the proxy's.
+  int max_surface_triangles = 6000;  ///< Aim of the simplification.
+  double max_distance_vox = 0.5;     ///< Bound of the simplification, voxels.
 };
-/// One component as tetrahedra: realize max(body, region), surface, simplify within a bound, check, tetrahedralize; one retry with a
-/// coarser surface. Loose islands without the largest piece are dropped. @throws Error SolverFailed.
+/// One component as tetrahedra: realize max(body, region), surface, simplify within a bound, check, tetrahedralize; one
+/// retry with a coarser surface. Loose islands without the largest piece are dropped. @throws Error SolverFailed.
 [[nodiscard]] TetMesh extract(const Proxy& proxy, const Shape& region, const ExtractParams& params = {},
                               const Context& context = {});
 

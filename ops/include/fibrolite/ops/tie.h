@@ -22,7 +22,8 @@ struct Tied {
   std::int64_t dropped = 0, filled = 0;
   Pieces left;  ///< left.material.size() == 1 unless the model itself has pieces farther apart than the reach.
 };
-/// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. At most three rounds.
+/// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. At most three
+/// rounds.
 [[nodiscard]] Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
                        const Context& context = {});
 

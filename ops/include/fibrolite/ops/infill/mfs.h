@@ -2,8 +2,8 @@
 // Muscle fibre structure (paper Sec. 5.1).
 #pragma once
 
-#include <filesystem>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 
 #include "fibrolite/ops/fill.h"
@@ -19,10 +19,10 @@ struct MfsParams {
   std::optional<std::filesystem::path> micrograph;  ///< Template image; default: the bundled one.
   std::uint64_t seed = 1;
 };
-/// The membranes, unclipped: a 2-D distance image swept along the column's centre line with a rotation-minimising frame.
-/// `body` and `shell_mm` bound the lumen: narrower than two fibres becomes solid, with a warning.
-/// @throws Error BadRecipe (a range above), BadInput (unreadable template, or one without fibres). Cost: O(1) per point after
-/// setting up. Source: paper Sec. 5.1; sweep and distance image ours.
+/// The membranes, unclipped: a 2-D distance image swept along the column's centre line with a rotation-minimising
+/// frame. `body` and `shell_mm` bound the lumen: narrower than two fibres becomes solid, with a warning.
+/// @throws Error BadRecipe (a range above), BadInput (unreadable template, or one without fibres). Cost: O(1) per point
+/// after setting up. Source: paper Sec. 5.1; sweep and distance image ours.
 [[nodiscard]] Fill generate(const Part& part, const MfsParams& params, const Shape& body, double shell_mm);
 
 }  // namespace fibrolite

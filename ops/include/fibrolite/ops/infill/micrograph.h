@@ -19,8 +19,8 @@ struct FibreMap {
 /// @throws Error BadInput: fewer than 4 fibres found.
 [[nodiscard]] FibreMap find_fibres(const GrayImage& micrograph);
 
-/// Tile-free texture of fibres, larger than the template, by image quilting (Efros & Freeman 2001), rescaled so that fibres have the
-/// wanted pitch, as a 2-D signed distance to the membranes: mm, negative in the membrane, sub-pixel.
+/// Tile-free texture of fibres, larger than the template, by image quilting (Efros & Freeman 2001), rescaled so that
+/// fibres have the wanted pitch, as a 2-D signed distance to the membranes: mm, negative in the membrane, sub-pixel.
 struct MembraneImage {
   FloatImage distance_mm;
   double pixel_mm = 0.1;
@@ -37,7 +37,8 @@ struct MembraneParams {
 
 /// 8-bit gray image from a .png, .jpg, .tif, .bmp file. @throws Error BadInput.
 [[nodiscard]] GrayImage read_gray(const std::filesystem::path& path);
-/// The micrograph that comes with the project (installed asset, or the one in the source tree). @throws Error Internal if missing.
+/// The micrograph that comes with the project (installed asset, or the one in the source tree). @throws Error Internal
+/// if missing.
 [[nodiscard]] std::filesystem::path bundled_micrograph();
 
 }  // namespace fibrolite

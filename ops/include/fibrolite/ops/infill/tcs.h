@@ -15,8 +15,8 @@ struct TcsParams {
   Vec3d shift_mm{};        ///< Lattice origin, world axes.
   bool stretch_z = false;  ///< Cell taller by sqrt(2) along world z: sticks at 45 degrees, printable without support.
 };
-/// The crystal, unclipped, world frame. @throws Error BadRecipe (a range above). Cost: O(1) per point. Source: paper Sec. 5.2; the
-/// sizes are ours.
+/// The crystal, unclipped, world frame. @throws Error BadRecipe (a range above). Cost: O(1) per point. Source: paper
+/// Sec. 5.2; the sizes are ours.
 [[nodiscard]] Fill generate(const Part& part, const TcsParams& params);
 /// The distance alone, for tests and benchmarks.
 [[nodiscard]] Shape crystal(const TcsParams& params);
