@@ -1,1 +1,131 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Presets and the rules between numbers; reading and printing is recipe_json.cpp.
+#include "fibrolite/ops/recipe.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "fibrolite/error.h"
+#include "fibrolite/ops/nearest.h"
+#include "number_text.h"
+
+namespace fibrolite {
+namespace {
+
+Recipe fdm() {
+  Recipe recipe;
+  recipe.tcs.stretch_z = true;
+  return recipe;
+}
+
+/// What the paper states: threshold 0.26, stresses along x, y, z, bridges by bounding boxes.
+Recipe paper() {
+  Recipe recipe;
+  recipe.partition.threshold = 0.26;
+  recipe.verify.world_axes = true;
+  recipe.joint.bridge = Bridge::Bbox;
+  return recipe;
+}
+
+/// The work that other lattice tools are measured by; used with the infill tcs.
+Recipe peer_tcs() {
+  Recipe recipe;
+  recipe.tcs.cell_mm = 5;
+  recipe.tcs.stick_mm = 1.0;
+  recipe.tcs.ball_mm = 1.6;
+  recipe.shell.thickness_mm = 1.0;
+  return recipe;
+}
+
+struct Preset {
+  const char* name;
+  Recipe (*make)();
+};
+constexpr Preset presets[] = {
+    {"default", [] { return Recipe{}; }}, {"fdm", fdm}, {"paper", paper}, {"peer-tcs", peer_tcs}};
+
+/// A length that has to survive sampling.
+struct Feature {
+  const char* key;
+  double mm;
+};
+std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
+  std::vector<Feature> list;
+  if (infill == InfillKind::Solid) return list;
+  list.push_back({"shell.thickness_mm", recipe.shell.thickness_mm});
+  const bool hybrid = infill == InfillKind::Hybrid;
+  if (hybrid || infill == InfillKind::Tcs) list.push_back({"tcs.stick_mm", recipe.tcs.stick_mm});
+  if (hybrid || infill == InfillKind::Mfs) list.push_back({"mfs.wall_mm", recipe.mfs.wall_mm});
+  if (hybrid && recipe.joint.enabled) {
+    list.push_back({"joint.layer_mm", recipe.joint.layer_mm});
+    list.push_back({"joint.column_mm", recipe.joint.column_mm});
+    list.push_back({"joint.min_wall_mm", recipe.joint.min_wall_mm});
+  }
+  return list;
+}
+
+[[noreturn]] void unfit(const std::string& what, const std::string& where, const std::string& hint) {
+  throw Error(Code::BadRecipe, what, where, hint);
+}
+
+void check_tcs(const TcsParams& tcs) {
+  if (tcs.cell_mm < 4 * tcs.stick_mm)
+    unfit(
+        "tcs.cell_mm is " + number_text(tcs.cell_mm) + ", too small for sticks of " + number_text(tcs.stick_mm) + " mm",
+        "recipe", "use a cell of " + number_text(4 * tcs.stick_mm) + " or more (4 * tcs.stick_mm), or thinner sticks");
+  if (tcs.ball_mm < tcs.stick_mm)
+    unfit("tcs.ball_mm is " + number_text(tcs.ball_mm) + ", smaller than the sticks", "recipe",
+          "use " + number_text(tcs.stick_mm) + " or more (tcs.stick_mm)");
+}
+
+void check_mfs(const MfsParams& mfs) {
+  if (mfs.fibre_mm <= 2 * mfs.wall_mm)
+    unfit("mfs.fibre_mm is " + number_text(mfs.fibre_mm) + ", no room for a void between walls of " +
+              number_text(mfs.wall_mm) + " mm",
+          "recipe", "use more than " + number_text(2 * mfs.wall_mm) + " (2 * mfs.wall_mm), or thinner walls");
+}
+
+void check_joint(const JointParams& joint) {
+  if (joint.spacing_mm <= joint.column_mm)
+    unfit("joint.spacing_mm is " + number_text(joint.spacing_mm) + ", columns would touch", "recipe",
+          "use more than " + number_text(joint.column_mm) + " (joint.column_mm)");
+}
+
+}  // namespace
+
+std::vector<std::string> preset_names() {
+  std::vector<std::string> names;
+  for (const Preset& p : presets) names.emplace_back(p.name);
+  return names;
+}
+
+Recipe preset(std::string_view name) {
+  for (const Preset& p : presets)
+    if (name == p.name) return p.make();
+  std::string all;
+  for (const std::string& known : preset_names()) all += (all.empty() ? "" : ", ") + known;
+  throw Error(Code::BadRecipe, "unknown preset '" + std::string(name) + "'", "presets: " + all,
+              "did you mean " + nearest_name(name, preset_names()) + "?");
+}
+
+double thinnest_mm(const Recipe& recipe, InfillKind infill) {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (const Feature& feature : features(recipe, infill)) thinnest = std::min(thinnest, feature.mm);
+  return thinnest;
+}
+
+void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
+  const bool hybrid = infill == InfillKind::Hybrid;
+  if (hybrid || infill == InfillKind::Tcs) check_tcs(recipe.tcs);
+  if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
+  if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);
+
+  constexpr double rounding = 1 - 1e-9;  // 0.8 mm at a voxel of 0.4 mm is two voxels, whatever the last bit says
+  for (const Feature& feature : features(recipe, infill))
+    if (feature.mm < 2 * voxel_mm * rounding)
+      unfit(std::string(feature.key) + " is " + number_text(feature.mm) + " mm, thinner than 2 voxels",
+            "voxel " + number_text(voxel_mm) + " mm",
+            "use " + number_text(2 * voxel_mm) + " or more, or --voxel " + number_text(feature.mm / 2) + " or less");
+}
+
+}  // namespace fibrolite

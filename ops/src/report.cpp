@@ -1,1 +1,156 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/report.h"
+
+#include <sys/resource.h>
+
+#include <charconv>
+#include <chrono>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace fibrolite {
+namespace {
+
+using Json = nlohmann::ordered_json;  // prints NaN and infinity as null
+
+Json list(Vec3d v) { return {v.x, v.y, v.z}; }
+
+Json to_json(const ModelReport& model) {
+  return {{"path", model.path},
+          {"triangles", model.triangles},
+          {"size_mm", list(model.size_mm)},
+          {"volume_mm3", model.volume_mm3},
+          {"repairs", model.repairs}};
+}
+
+Json to_json(const PartReport& part) {
+  const Json stress = {{"axial", part.stress.axial},
+                       {"transverse", {part.stress.transverse[0], part.stress.transverse[1]}},
+                       {"von_mises", part.stress.von_mises}};
+  return {{"id", part.id},
+          {"kind", part.kind},
+          {"infill", part.infill},
+          {"volume_mm3", part.volume_mm3},
+          {"lumen_mm3", part.lumen_mm3},
+          {"infill_volume_mm3", part.infill_volume_mm3},
+          {"fibres", part.fibres},
+          {"centroid_mm", list(part.centroid_mm)},
+          {"axis", list(part.axis)},
+          {"diameter_mm", part.diameter_mm},
+          {"mean_stress_mpa", stress},
+          {"dominance", part.stress.dominance},
+          {"reason", part.reason}};
+}
+
+Json to_json(const InterfaceReport& interface) {
+  return {{"parts", {interface.a, interface.b}},
+          {"centroid_mm", list(interface.centroid_mm)},
+          {"normal", list(interface.normal)},
+          {"area_mm2", interface.area_mm2},
+          {"regions_before", interface.regions_before},
+          {"regions_after", interface.regions_after},
+          {"columns", interface.columns},
+          {"columns_dropped", interface.columns_dropped},
+          {"layer_area_mm2", interface.layer_area_mm2},
+          {"union_area_mm2", interface.union_area_mm2},
+          {"bridge_area_mm2", interface.bridge_area_mm2},
+          {"contact_area_mm2", interface.contact_area_mm2},
+          {"capacity_over_demand", nullptr}};  // needs the stress at the interface, which no run resolves
+}
+
+Json to_json(const SolidReport& solid) {
+  return {{"volume_mm3", solid.volume_mm3},
+          {"fill_ratio", solid.fill_ratio},
+          {"mass_g", solid.mass_g},
+          {"pieces", solid.pieces},
+          {"cavities", solid.cavities},
+          {"cavity_volume_mm3", solid.cavity_volume_mm3},
+          {"ties", solid.ties},
+          {"specks_removed", solid.specks_removed},
+          {"voids_filled", solid.voids_filled},
+          {"dangling", solid.dangling},
+          {"unreached", solid.unreached},
+          {"active_voxels", solid.active_voxels},
+          {"voxel_mm", solid.voxel_mm}};
+}
+
+Json to_json(const MeshCheck& mesh) {
+  return {{"volume_mm3", mesh.volume_mm3},
+          {"triangles", mesh.triangles},
+          {"vertices", mesh.vertices},
+          {"boundary_edges", mesh.boundary_edges},
+          {"nonmanifold_edges", mesh.nonmanifold_edges},
+          {"nonmanifold_vertices", mesh.nonmanifold_vertices},
+          {"degenerate_triangles", mesh.degenerate_triangles},
+          {"shells", mesh.shells}};
+}
+
+Json to_json(const StageReport& stage) {
+  return {{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}, {"peak_rss_mb", stage.peak_rss_mb}};
+}
+
+template <class Item>
+Json array(const std::vector<Item>& items) {
+  Json json = Json::array();
+  for (const Item& item : items) json.push_back(to_json(item));
+  return json;
+}
+
+double wall_now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double cpu_now_s() {
+  double seconds = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    seconds += static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+               1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+  }
+  return seconds;
+}
+
+/// From the kernel's own mark; ru_maxrss would also count what a parent held before it started this program.
+double peak_rss_mb() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (!line.starts_with("VmHWM:")) continue;
+    const auto digits = line.find_first_of("0123456789");
+    long kib = 0;
+    if (digits != std::string::npos) std::from_chars(line.data() + digits, line.data() + line.size(), kib);
+    return static_cast<double>(kib) * 1024e-6;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string version() { return FIBROLITE_VERSION; }
+
+std::string to_json(const Report& report) {
+  const Json json = {
+      {"schema", 1},
+      {"version", version()},
+      {"command", report.command},
+      {"infill", report.infill},
+      {"recipe", Json::parse(to_json(report.recipe))},
+      {"model", to_json(report.model)},
+      {"partition",
+       {{"threshold", report.threshold}, {"stable_from", report.stable_from}, {"stable_to", report.stable_to}}},
+      {"parts", array(report.parts)},
+      {"interfaces", array(report.interfaces)},
+      {"solid", to_json(report.solid)},
+      {"mesh", to_json(report.mesh)},
+      {"threads", report.threads},
+      {"stages", array(report.stages)},
+      {"warnings", report.warnings}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // a path need not be UTF-8
+}
+
+Stopwatch::Lap::Lap(std::vector<StageReport>& list, const char* stage)
+    : out(&list), name(stage), wall0(wall_now_s()), cpu0(cpu_now_s()) {}
+
+Stopwatch::Lap::~Lap() { out->push_back({name, wall_now_s() - wall0, cpu_now_s() - cpu0, peak_rss_mb()}); }
+
+}  // namespace fibrolite

@@ -1,1 +1,226 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/recipe.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "fibrolite/error.h"
+#include "fibrolite/ops/nearest.h"
+
+namespace fibrolite {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// The message of the BadRecipe error that `work` throws; empty if it throws none.
+template <class Work>
+std::string refusal(Work&& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), Code::BadRecipe) << error.what();
+    return error.what();
+  }
+  return {};
+}
+std::string refusal_of(const std::string& json) {
+  return refusal([&] { static_cast<void>(parse_recipe(json, Recipe{}, "mine.json")); });
+}
+std::string refusal_of_set(const std::string& assignment) {
+  return refusal([&] { static_cast<void>(set(Recipe{}, assignment)); });
+}
+
+TEST(NearestName, DistancesCountedByHand) {
+  EXPECT_EQ(edit_distance("", "abc"), 3);
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3);
+  EXPECT_EQ(edit_distance("sitting", "kitten"), 3);
+  EXPECT_EQ(edit_distance("hybird", "hybrid"), 1);  // two neighbours swapped
+  EXPECT_EQ(edit_distance("TCS", "tcs"), 0);
+  EXPECT_EQ(nearest_name("gyroyd", {"tcs", "gyroid", "cubic"}), "gyroid");
+  EXPECT_EQ(nearest_name("x", {}), "");
+}
+
+TEST(Presets, HoldTheNumbersTheyPromise) {
+  EXPECT_EQ(preset_names().front(), "default");
+  EXPECT_EQ(to_json(preset("default")), to_json(Recipe{}));
+  EXPECT_EQ(preset("paper").partition.threshold, 0.26);
+  EXPECT_TRUE(preset("paper").verify.world_axes);
+  EXPECT_EQ(preset("paper").joint.bridge, Bridge::Bbox);
+  EXPECT_FALSE(preset("paper").tcs.stretch_z);
+  EXPECT_TRUE(preset("fdm").tcs.stretch_z);
+  EXPECT_EQ(preset("peer-tcs").tcs.cell_mm, 5);
+  EXPECT_EQ(preset("peer-tcs").tcs.stick_mm, 1.0);
+  EXPECT_EQ(preset("peer-tcs").tcs.ball_mm, 1.6);
+  EXPECT_EQ(preset("peer-tcs").shell.thickness_mm, 1.0);
+  EXPECT_FALSE(preset("default").partition.threshold.has_value());
+}
+
+TEST(Presets, EachFitsItsOwnRules) {
+  for (const std::string& name : preset_names())
+    EXPECT_EQ(refusal([&] { check_recipe(preset(name), thinnest_mm(preset(name)) / 2); }), "") << name;
+}
+
+TEST(Presets, AnUnknownOneNamesTheNearest) {
+  EXPECT_THAT(refusal([] { static_cast<void>(preset("papr")); }),
+              AllOf(HasSubstr("'papr'"), HasSubstr("did you mean paper?")));
+}
+
+TEST(Recipe, ReadsBackWhatItPrints) {
+  Recipe recipe = preset("paper");
+  recipe.tcs.cell_mm = 1.0 / 3.0;
+  recipe.tcs.shift_mm = {0.1, -2e-17, 5};
+  recipe.mfs.micrograph = "/a folder/ü.png";
+  recipe.seed = 18446744073709551615U;
+  recipe.joint.enabled = false;
+  const Recipe again = parse_recipe(to_json(recipe), Recipe{}, "printed");
+  EXPECT_EQ(again.tcs.cell_mm, recipe.tcs.cell_mm);
+  EXPECT_EQ(again.tcs.shift_mm, recipe.tcs.shift_mm);
+  EXPECT_EQ(again.mfs.micrograph, recipe.mfs.micrograph);
+  EXPECT_EQ(again.seed, recipe.seed);
+  EXPECT_EQ(to_json(again), to_json(recipe));
+}
+
+TEST(Recipe, EveryKeyIsPrintedAndCanBeSetToWhatIsPrinted) {
+  const auto printed = nlohmann::json::parse(to_json(Recipe{}));
+  std::size_t leaves = 0;
+  for (const auto& [group, value] : printed.items()) leaves += value.is_object() ? value.size() : 1;
+  EXPECT_EQ(leaves, recipe_keys().size());
+  for (const RecipeKey& about : recipe_keys()) {
+    std::string pointer = "/" + about.key;
+    if (const auto dot = pointer.find('.'); dot != std::string::npos) pointer[dot] = '/';
+    const auto& value = printed.at(nlohmann::json::json_pointer(pointer));
+    EXPECT_EQ(refusal_of_set(about.key + "=" + value.dump()), "");
+    EXPECT_FALSE(about.range.empty()) << about.key;
+    EXPECT_FALSE(about.doc.empty()) << about.key;
+  }
+}
+
+TEST(Recipe, KeysLeftOutKeepTheBase) {
+  const Recipe recipe = parse_recipe(R"({"tcs": {"stick_mm": 0.9}})", preset("peer-tcs"), "mine.json");
+  EXPECT_EQ(recipe.tcs.stick_mm, 0.9);
+  EXPECT_EQ(recipe.tcs.cell_mm, 5);
+  EXPECT_EQ(to_json(parse_recipe("{}", preset("paper"), "mine.json")), to_json(preset("paper")));
+}
+
+TEST(Recipe, ThresholdIsAutoOrANumber) {
+  EXPECT_FALSE(
+      parse_recipe(R"({"partition": {"threshold": "auto"}})", preset("paper"), "x").partition.threshold.has_value());
+  EXPECT_EQ(parse_recipe(R"({"partition": {"threshold": 0.3}})", Recipe{}, "x").partition.threshold, 0.3);
+  EXPECT_THAT(refusal_of(R"({"partition": {"threshold": "atuo"}})"),
+              HasSubstr("partition.threshold cannot be \"atuo\""));
+}
+
+TEST(Recipe, OneSeedForAll) {
+  EXPECT_EQ(set(Recipe{}, "seed=7").mfs.seed, 7U);
+  EXPECT_EQ(parse_recipe(R"({"seed": 9})", Recipe{}, "x").mfs.seed, 9U);
+}
+
+TEST(Recipe, UnknownKeysNameThePlaceAndTheNearestKey) {
+  EXPECT_THAT(
+      refusal_of(R"({"tcs": {"cel_mm": 5}})"),
+      AllOf(HasSubstr("unknown key tcs.cel_mm"), HasSubstr("mine.json"), HasSubstr("did you mean tcs.cell_mm?")));
+  EXPECT_THAT(refusal_of(R"({"sed": 5})"), HasSubstr("did you mean seed?"));
+  EXPECT_THAT(refusal_of(R"({"shel": {"thickness_mm": 2}})"), HasSubstr("unknown key shel"));
+  EXPECT_THAT(refusal_of_set("joint.brige=mst"), HasSubstr("did you mean joint.bridge?"));
+}
+
+TEST(Recipe, WrongTypesAreRefused) {
+  EXPECT_THAT(refusal_of(R"({"tcs": {"cell_mm": "5"}})"), HasSubstr("tcs.cell_mm cannot be \"5\""));
+  EXPECT_THAT(refusal_of(R"({"tcs": {"cell_mm": null}})"), HasSubstr("tcs.cell_mm cannot be null"));
+  EXPECT_THAT(refusal_of(R"({"tcs": 5})"), HasSubstr("tcs cannot be 5"));
+  EXPECT_THAT(refusal_of(R"({"tcs": {"stretch_z": 1}})"), HasSubstr("true or false"));
+  EXPECT_THAT(refusal_of(R"({"tcs": {"shift_mm": [1, 2]}})"), HasSubstr("[x, y, z]"));
+  EXPECT_THAT(refusal_of(R"({"joint": {"bridge": "rope"}})"), HasSubstr("\"mst\" or \"bbox\""));
+  EXPECT_THAT(refusal_of(R"({"seed": -1})"), HasSubstr("whole number"));
+  EXPECT_THAT(refusal_of(R"({"seed": 1.5})"), HasSubstr("whole number"));
+  EXPECT_THAT(refusal_of(R"({"mfs": {"template": ""}})"), HasSubstr("mfs.template"));
+  EXPECT_THAT(refusal_of("[1, 2]"), HasSubstr("not a JSON object"));
+}
+
+TEST(Recipe, OutOfRangeIsRefusedAndTheEndsAreNot) {
+  EXPECT_THAT(refusal_of(R"({"partition": {"threshold": 1.01}})"), HasSubstr("0 to 1"));
+  EXPECT_EQ(refusal_of(R"({"partition": {"threshold": 1}})"), "");
+  EXPECT_THAT(refusal_of(R"({"verify": {"dominance": 1}})"), HasSubstr("above 1"));
+  EXPECT_THAT(refusal_of(R"({"verify": {"load_n": 0}})"), HasSubstr("above 0"));
+  EXPECT_THAT(refusal_of(R"({"material": {"poisson": 0.5}})"), HasSubstr("0 to 0.49"));
+  EXPECT_THAT(refusal_of(R"({"shell": {"thickness_mm": -1}})"), HasSubstr("shell.thickness_mm cannot be -1"));
+}
+
+TEST(Recipe, NoNumberThatIsNone) {
+  EXPECT_NE(refusal_of(R"({"tcs": {"cell_mm": NaN}})"), "");
+  EXPECT_NE(refusal_of(R"({"tcs": {"cell_mm": 1e999}})"), "");
+  for (const char* value : {"nan", "NaN", "inf", "-inf", "1e999", "0x10", "5mm", "", "1,5"})
+    EXPECT_THAT(refusal_of_set(std::string("tcs.cell_mm=") + value), HasSubstr("tcs.cell_mm cannot be")) << value;
+}
+
+TEST(Recipe, BrokenJsonSaysWhereInOneLine) {
+  const std::string message = refusal_of("{\n \"tcs\": {\n \"cell_mm\": 5,,\n}}");
+  EXPECT_THAT(message, AllOf(HasSubstr("line 3"), HasSubstr("mine.json")));
+  EXPECT_EQ(message.find('\n'), std::string::npos);
+  EXPECT_NE(refusal_of(""), "");
+}
+
+TEST(Recipe, AKeyGivenTwiceIsRefused) {
+  EXPECT_THAT(refusal_of(R"({"tcs": {"cell_mm": 5, "cell_mm": 6}})"), HasSubstr("cell_mm appears twice"));
+  EXPECT_EQ(refusal_of(R"({"tcs": {"cell_mm": 5}, "seed": 1})"), "");
+}
+
+TEST(Set, TakesPlainWordsAndPaths) {
+  EXPECT_EQ(set(Recipe{}, "tcs.cell_mm=5").tcs.cell_mm, 5);
+  EXPECT_EQ(set(Recipe{}, "joint.bridge=bbox").joint.bridge, Bridge::Bbox);
+  EXPECT_EQ(set(Recipe{}, "mfs.template=/a/b=c.png").mfs.micrograph, "/a/b=c.png");
+  EXPECT_EQ(set(Recipe{}, "tcs.shift_mm=[1,2,3]").tcs.shift_mm, (Vec3d{1, 2, 3}));
+  EXPECT_FALSE(set(preset("paper"), "partition.threshold=auto").partition.threshold.has_value());
+}
+
+TEST(Set, RefusesWhatIsNoAssignment) {
+  EXPECT_THAT(refusal_of_set("tcs.cell_mm"), HasSubstr("no value"));
+  EXPECT_THAT(refusal_of_set("tcs=5"), HasSubstr("one of its keys"));
+  EXPECT_NE(refusal_of_set("=5"), "");
+}
+
+TEST(CheckRecipe, TwoVoxelsIsTheLimit) {
+  EXPECT_EQ(refusal([] { check_recipe(Recipe{}, 0.4); }), "");  // sticks and walls of 0.8 mm
+  EXPECT_THAT(refusal([] { check_recipe(Recipe{}, 0.41); }),
+              AllOf(HasSubstr("thinner than 2 voxels"), HasSubstr("0.82")));
+  EXPECT_THAT(refusal([] { check_recipe(set(Recipe{}, "tcs.stick_mm=0.3"), 0.25); }),
+              HasSubstr("tcs.stick_mm is 0.3 mm"));
+}
+
+TEST(CheckRecipe, OnlyWhatTheInfillUsesMatters) {
+  Recipe thin;
+  thin.tcs.stick_mm = 0.1;
+  EXPECT_NE(refusal([&] { check_recipe(thin, 0.3, InfillKind::Tcs); }), "");
+  EXPECT_NE(refusal([&] { check_recipe(thin, 0.3, InfillKind::Hybrid); }), "");
+  EXPECT_EQ(refusal([&] { check_recipe(thin, 0.3, InfillKind::Mfs); }), "");
+  EXPECT_EQ(refusal([&] { check_recipe(thin, 0.3, InfillKind::Solid); }), "");
+  EXPECT_DOUBLE_EQ(thinnest_mm(thin, InfillKind::Hybrid), 0.1);
+  EXPECT_DOUBLE_EQ(thinnest_mm(thin, InfillKind::Mfs), 0.8);
+  EXPECT_DOUBLE_EQ(thinnest_mm(preset("peer-tcs"), InfillKind::Tcs), 1.0);
+  EXPECT_TRUE(std::isinf(thinnest_mm(thin, InfillKind::Solid)));
+  Recipe layer;
+  layer.joint.layer_mm = 0.2;
+  EXPECT_DOUBLE_EQ(thinnest_mm(layer), 0.2);
+  layer.joint.enabled = false;
+  EXPECT_DOUBLE_EQ(thinnest_mm(layer), 0.8);
+}
+
+TEST(CheckRecipe, NumbersMustFitEachOther) {
+  const auto refused = [](const char* assignment) {
+    return refusal([&] { check_recipe(set(Recipe{}, assignment), 0); });
+  };
+  EXPECT_THAT(refused("tcs.cell_mm=3.1"), HasSubstr("tcs.cell_mm"));
+  EXPECT_EQ(refused("tcs.cell_mm=3.2"), "");
+  EXPECT_THAT(refused("tcs.ball_mm=0.7"), HasSubstr("tcs.ball_mm"));
+  EXPECT_EQ(refused("tcs.ball_mm=0.8"), "");
+  EXPECT_THAT(refused("mfs.fibre_mm=1.6"), HasSubstr("mfs.fibre_mm"));
+  EXPECT_EQ(refused("mfs.fibre_mm=1.61"), "");
+  EXPECT_THAT(refused("joint.spacing_mm=0.8"), HasSubstr("joint.spacing_mm"));
+}
+
+}  // namespace
+}  // namespace fibrolite

@@ -1,1 +1,171 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <time.h>
+
+#include <chrono>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "fibrolite/error.h"
+
+namespace fibrolite {
+namespace {
+
+using nlohmann::json;
+
+Report filled() {
+  Report report;
+  report.command = "fibrolite generate a.stl -o b.stl";
+  report.model = {"a.stl", 12, {1, 2, 3}, 6, {"turned inside out"}};
+  PartReport part;
+  part.id = 3;
+  part.kind = "column";
+  part.infill = "mfs";
+  part.volume_mm3 = 10;
+  part.infill_volume_mm3 = 4;
+  part.fibres = 19;
+  part.centroid_mm = {1, 2, 3};
+  part.axis = {0, 0, 1};
+  part.stress = {-5, {0.5, 0.25}, 5.5, 10};
+  part.reason = "carries along its axis";
+  report.parts = {part};
+  InterfaceReport interface;
+  interface.a = 3;
+  interface.b = 0;
+  interface.regions_before = 12;
+  interface.regions_after = 1;
+  interface.columns = 4;
+  report.interfaces = {interface};
+  report.solid.pieces = 1;
+  report.solid.voxel_mm = 0.25;
+  report.mesh.triangles = 99;
+  report.stages = {{"read", 0.5, 0.4, 20}};
+  report.warnings = {"small"};
+  return report;
+}
+
+TEST(Report, HasEveryKeyOfSchemaOne) {
+  const json report = json::parse(to_json(filled()));
+  EXPECT_EQ(report.at("schema"), 1);
+  EXPECT_EQ(report.at("version"), version());
+  for (const char* key : {"command", "recipe", "model", "parts", "interfaces", "solid", "mesh", "stages", "warnings"})
+    EXPECT_TRUE(report.contains(key)) << key;
+  for (const char* key : {"path", "triangles", "size_mm", "volume_mm3", "repairs"})
+    EXPECT_TRUE(report.at("model").contains(key)) << key;
+  for (const char* key : {"id", "kind", "infill", "volume_mm3", "infill_volume_mm3", "fibres", "centroid_mm", "axis",
+                          "diameter_mm", "mean_stress_mpa", "dominance", "reason"})
+    EXPECT_TRUE(report.at("parts").at(0).contains(key)) << key;
+  for (const char* key : {"parts", "centroid_mm", "normal", "area_mm2", "regions_before", "regions_after", "columns",
+                          "contact_area_mm2", "capacity_over_demand"})
+    EXPECT_TRUE(report.at("interfaces").at(0).contains(key)) << key;
+  for (const char* key : {"volume_mm3", "fill_ratio", "mass_g", "pieces", "cavities", "cavity_volume_mm3", "dangling",
+                          "unreached", "active_voxels", "voxel_mm"})
+    EXPECT_TRUE(report.at("solid").contains(key)) << key;
+  for (const char* key : {"volume_mm3", "triangles", "vertices", "boundary_edges", "nonmanifold_edges",
+                          "nonmanifold_vertices", "degenerate_triangles", "shells"})
+    EXPECT_TRUE(report.at("mesh").contains(key)) << key;
+  for (const char* key : {"name", "wall_s", "peak_rss_mb"}) EXPECT_TRUE(report.at("stages").at(0).contains(key)) << key;
+}
+
+TEST(Report, ShapesOfValues) {
+  const json report = json::parse(to_json(filled()));
+  EXPECT_EQ(report["model"]["size_mm"], json({1.0, 2.0, 3.0}));
+  EXPECT_EQ(report["model"]["repairs"], json({"turned inside out"}));
+  EXPECT_EQ(report["parts"][0]["mean_stress_mpa"]["axial"], -5.0);
+  EXPECT_EQ(report["parts"][0]["mean_stress_mpa"]["transverse"], json({0.5, 0.25}));
+  EXPECT_EQ(report["interfaces"][0]["parts"], json({3, 0}));
+  EXPECT_EQ(report["solid"]["voxel_mm"], 0.25);
+  EXPECT_EQ(json::parse(to_json(Report{}))["parts"], json::array());
+}
+
+TEST(Report, TheRecipeInItIsARecipe) {
+  Report report;
+  report.recipe = preset("paper");
+  const std::string recipe = json::parse(to_json(report)).at("recipe").dump();
+  EXPECT_EQ(to_json(parse_recipe(recipe, Recipe{}, "report")), to_json(preset("paper")));
+}
+
+TEST(Report, WhatIsNoNumberIsNull) {
+  Report report = filled();
+  report.solid.fill_ratio = std::numeric_limits<double>::quiet_NaN();
+  report.parts[0].stress.dominance = std::numeric_limits<double>::infinity();
+  const std::string text = to_json(report);
+  EXPECT_TRUE(json::parse(text)["solid"]["fill_ratio"].is_null());
+  EXPECT_TRUE(json::parse(text)["parts"][0]["dominance"].is_null());
+}
+
+TEST(Report, NumbersKeepTheirBits) {
+  Report report;
+  report.solid.volume_mm3 = 1.0 / 3.0;
+  report.solid.mass_g = 1e-300;
+  report.solid.active_voxels = std::numeric_limits<std::int64_t>::max();
+  const json solid = json::parse(to_json(report))["solid"];
+  EXPECT_EQ(solid["volume_mm3"].get<double>(), 1.0 / 3.0);
+  EXPECT_EQ(solid["mass_g"].get<double>(), 1e-300);
+  EXPECT_EQ(solid["active_voxels"].get<std::int64_t>(), std::numeric_limits<std::int64_t>::max());
+}
+
+TEST(Report, APathThatIsNotUtf8DoesNotBreakIt) {
+  Report report;
+  report.model.path = "b\xff.stl";
+  EXPECT_TRUE(json::accept(to_json(report)));
+}
+
+TEST(Report, SameReportSameText) { EXPECT_EQ(to_json(filled()), to_json(filled())); }
+
+TEST(Stopwatch, WallCountsWaitingCpuDoesNot) {
+  std::vector<StageReport> stages;
+  Stopwatch stage(stages);
+  const int answer = stage("wait", [] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return 42;
+  });
+  EXPECT_EQ(answer, 42);
+  ASSERT_EQ(stages.size(), 1U);
+  EXPECT_EQ(stages[0].name, "wait");
+  EXPECT_GE(stages[0].wall_s, 0.05);
+  EXPECT_LT(stages[0].cpu_s, 0.04);
+}
+
+TEST(Stopwatch, CpuIsThatOfTheProcess) {
+  const auto cpu_now = [] {
+    timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  };
+  std::vector<StageReport> stages;
+  const double start = cpu_now();
+  Stopwatch{stages}("spin", [&] {
+    while (cpu_now() - start < 0.1) {
+    }
+  });
+  EXPECT_NEAR(stages.at(0).cpu_s, 0.1, 0.03);
+}
+
+TEST(Stopwatch, PeakMemoryHoldsWhatWasTouched) {
+  constexpr std::size_t bytes = 64'000'000;
+  std::vector<StageReport> stages;
+  Stopwatch stage(stages);
+  stage("before", [] {});
+  stage("touch", [] {
+    std::vector<char> memory(bytes);
+    for (std::size_t i = 0; i < bytes; i += 4096) static_cast<volatile char&>(memory[i]) = 1;
+  });
+  stage("after", [] {});
+  EXPECT_GE(stages[1].peak_rss_mb - stages[0].peak_rss_mb, 60);
+  EXPECT_LE(stages[1].peak_rss_mb - stages[0].peak_rss_mb, 80);
+  EXPECT_GE(stages[2].peak_rss_mb, stages[1].peak_rss_mb);
+}
+
+TEST(Stopwatch, AStageThatThrowsIsNoted) {
+  std::vector<StageReport> stages;
+  EXPECT_THROW(Stopwatch{stages}("fails", []() -> int { throw Error(Code::SolverFailed, "x"); }), Error);
+  EXPECT_EQ(stages.at(0).name, "fails");
+}
+
+}  // namespace
+}  // namespace fibrolite

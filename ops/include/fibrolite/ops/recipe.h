@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fibrolite/ops/diameter.h"
+#include "fibrolite/ops/infill/infill.h"
 #include "fibrolite/ops/infill/mfs.h"
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/joint.h"
@@ -26,7 +27,7 @@ struct Recipe {
   ShellParams shell;
   PartitionParams partition;
   VerifyParams verify;
-  MfsParams mfs;
+  MfsParams mfs;  ///< Its seed follows `seed`.
   TcsParams tcs;
   JointParams joint;
   Material material;
@@ -38,17 +39,28 @@ struct Recipe {
 /// @throws Error BadRecipe: unknown preset (with the nearest name).
 [[nodiscard]] Recipe preset(std::string_view name);
 
-/// Strict: an unknown key, a wrong type or a value out of range is an error that names the place and the nearest key.
-/// Keys left out keep the value of `base`. @throws Error BadRecipe.
+/// Strict: an unknown or repeated key, a wrong type or a value out of range is an error that names the place and the
+/// nearest key. Keys left out keep the value of `base`. `source_name` is where the text comes from, for messages.
+/// @throws Error BadRecipe.
 [[nodiscard]] Recipe parse_recipe(std::string_view json, const Recipe& base, std::string_view source_name);
 /// "tcs.cell_mm=5": path and value as in --set. @throws Error BadRecipe.
 [[nodiscard]] Recipe set(const Recipe& base, std::string_view assignment);
 /// The whole recipe as pretty JSON that parse_recipe() reads back to the same values.
 [[nodiscard]] std::string to_json(const Recipe& recipe);
 
-/// Ranges that need the voxel: everything is at least two voxels thick. @throws Error BadRecipe, naming the key.
-void check_recipe(const Recipe& recipe, double voxel_mm);
-/// The thinnest feature of the recipe, mm.
-[[nodiscard]] double thinnest_mm(const Recipe& recipe);
+/// One key of a recipe, for help texts.
+struct RecipeKey {
+  std::string key;    ///< E.g. "tcs.cell_mm".
+  std::string range;  ///< What it accepts, in words.
+  std::string doc;
+};
+/// Every key, in the order of to_json().
+[[nodiscard]] std::vector<RecipeKey> recipe_keys();
+
+/// What the numbers must be to each other, and that everything `infill` makes is at least two voxels thick. A voxel of
+/// 0 checks the first alone. Only features that `infill` uses matter. @throws Error BadRecipe, naming the key.
+void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill = InfillKind::Hybrid);
+/// The thinnest feature that `infill` makes, mm; infinity if it makes none.
+[[nodiscard]] double thinnest_mm(const Recipe& recipe, InfillKind infill = InfillKind::Hybrid);
 
 }  // namespace fibrolite

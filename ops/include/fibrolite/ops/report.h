@@ -42,7 +42,9 @@ struct SolidReport {
 };
 struct StageReport {
   std::string name;
-  double wall_s = 0, cpu_s = 0, peak_rss_mb = 0;
+  double wall_s = 0;
+  double cpu_s = 0;        ///< All threads, and child processes that have ended.
+  double peak_rss_mb = 0;  ///< Highest resident memory of the process up to the end of the stage, 10^6 bytes.
 };
 struct ModelReport {
   std::string path;
@@ -55,6 +57,7 @@ struct Report {
   std::string command;
   Recipe recipe;
   std::string infill = "hybrid";
+  int threads = 0;  ///< 0: not known.
   ModelReport model;
   double threshold = 0, stable_from = 0, stable_to = 0;
   std::vector<PartReport> parts;
@@ -64,16 +67,17 @@ struct Report {
   std::vector<StageReport> stages;
   std::vector<std::string> warnings;
 };
-/// Schema 1, pretty, keys in a fixed order; no NaN or infinity ever (null instead).
+/// Schema 1, pretty, keys in a fixed order; no NaN or infinity ever (null instead). What a run does not measure is
+/// given as NaN.
 [[nodiscard]] std::string to_json(const Report& report);
-/// The "mesh" block alone, with size and closedness, for `fibrolite check`.
+/// Version of the library, "major.minor.patch".
 [[nodiscard]] std::string version();
 
 /// Measures wall, CPU and peak memory of named stages.
 class Stopwatch {
  public:
   explicit Stopwatch(std::vector<StageReport>& out) : out_(&out) {}
-  /// Run `work` as the stage `name`.
+  /// Run `work` as the stage `name`. A stage is noted even if its work throws.
   template <class Work>
   auto operator()(const char* name, Work&& work) {
     Lap lap(*out_, name);
