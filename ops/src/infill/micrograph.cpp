@@ -1,1 +1,212 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/infill/micrograph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fibrolite/error.h"
+#include "fibrolite/file.h"
+#include "infill/cells.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr int max_side_px = 2048;      // larger templates are halved: fibres stay many pixels wide
+constexpr double distance_unit = 64;   // a pixel of distance in the integer height image
+constexpr double saddle_ratio = 0.72;  // a waist wider than this share of the smaller fibre is no border
+
+/// 8-bit, no larger than max_side_px, grain smoothed, light evened out.
+cv::Mat even_light(const GrayImage& micrograph) {
+  cv::Mat gray(micrograph.height, micrograph.width, CV_8U);
+  std::copy(micrograph.pixels.begin(), micrograph.pixels.end(), gray.begin<std::uint8_t>());
+  while (std::max(gray.cols, gray.rows) > max_side_px) cv::resize(gray, gray, {}, 0.5, 0.5, cv::INTER_AREA);
+
+  cv::Mat value, light;
+  gray.convertTo(value, CV_32F);
+  value += 1;
+  // Three box filters make a near Gaussian whose cost does not grow with its width.
+  const int width = std::max(3, std::min(gray.cols, gray.rows) / 8) | 1;
+  value.copyTo(light);
+  for (int pass = 0; pass < 3; ++pass)
+    cv::boxFilter(light, light, CV_32F, {width, width}, {-1, -1}, true, cv::BORDER_REFLECT);
+  cv::Mat flat;
+  cv::divide(value, light, flat, 128);
+  flat.convertTo(gray, CV_8U);
+  cv::medianBlur(gray, gray, 5);
+  cv::GaussianBlur(gray, gray, {5, 5}, 1.0);
+  return gray;
+}
+
+cv::Mat depth_of(const cv::Mat& mask) {
+  cv::Mat depth;
+  cv::distanceTransform(mask, depth, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  return depth;
+}
+
+/// How fat the mask is: mean depth of its pixels.
+double thickness(const cv::Mat& mask) {
+  const double pixels = cv::countNonZero(mask);
+  return pixels > 0 ? cv::sum(depth_of(mask))[0] / pixels : 0;
+}
+
+/// Share of the mask that its largest connected region holds.
+double largest_share(const cv::Mat& mask) {
+  cv::Mat label, stats, centers;
+  const int count = cv::connectedComponentsWithStats(mask, label, stats, centers, 4, CV_32S);
+  int largest = 0;
+  for (int i = 1; i < count; ++i) largest = std::max(largest, stats.at<int>(i, cv::CC_STAT_AREA));
+  return static_cast<double>(largest) / std::max(1, cv::countNonZero(mask));
+}
+
+/// Fibres are fat and apart, membranes are thin and hang together: whichever differs more decides.
+bool bright_is_fibre(const cv::Mat& bright) {
+  const cv::Mat dark = ~bright;
+  const double by_thickness = std::log((thickness(bright) + 0.1) / (thickness(dark) + 0.1));
+  const double by_share = std::log((largest_share(dark) + 0.05) / (largest_share(bright) + 0.05));
+  return by_thickness + 0.5 * by_share > 0;
+}
+
+/// Nuclei and grain inside a fibre are not membrane: fill holes that are small against the fibres.
+void fill_small_holes(cv::Mat& fibre, double typical_radius_px) {
+  cv::Mat label, stats, centers;
+  const int count = cv::connectedComponentsWithStats(~fibre, label, stats, centers, 8, CV_32S);
+  const double limit = 0.5 * typical_radius_px * typical_radius_px;
+  for (int y = 0; y < fibre.rows; ++y)
+    for (int x = 0; x < fibre.cols; ++x) {
+      const int i = label.at<int>(y, x);
+      if (i > 0 && i < count && stats.at<int>(i, cv::CC_STAT_AREA) < limit) fibre.at<std::uint8_t>(y, x) = 255;
+    }
+}
+
+template <class T>
+double median(std::vector<T> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
+/// One marker per fibre: the core of each basin of depth; basins too shallow to be a fibre have none.
+cv::Mat markers(const cv::Mat& depth, int& count) {
+  Image<std::uint16_t> height(depth.cols, depth.rows);
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x)
+      height(x, y) = static_cast<std::uint16_t>(std::min(65535.0, std::round(depth.at<float>(y, x) * distance_unit)));
+  const Basins found = basins(height, saddle_ratio);
+  cv::Mat marker = cv::Mat::zeros(depth.rows, depth.cols, CV_32S);
+  count = 0;
+  if (found.count == 0) return marker;
+  // Specks outnumber fibres in a noisy image: the median is taken by area, that is over pixels.
+  std::vector<std::uint16_t> peak_of_pixel;
+  for (const std::int32_t label : found.label.pixels)
+    if (label > 0) peak_of_pixel.push_back(found.peak[static_cast<std::size_t>(label - 1)]);
+  const double typical = median(std::move(peak_of_pixel));
+  std::vector<int> number(found.peak.size(), 0);
+  for (std::size_t i = 0; i < found.peak.size(); ++i)
+    if (found.peak[i] > 0.25 * typical) number[i] = ++count;
+  for (int y = 0; y < depth.rows; ++y)
+    for (int x = 0; x < depth.cols; ++x) {
+      const int label = found.label(x, y);
+      if (label == 0) continue;
+      const auto i = static_cast<std::size_t>(label - 1);
+      if (number[i] > 0 && height(x, y) > 0.6 * found.peak[i]) marker.at<int>(y, x) = number[i];
+    }
+  return marker;
+}
+
+LabelImage to_labels(const cv::Mat& marker) {
+  LabelImage label(marker.cols, marker.rows);
+  for (int y = 0; y < marker.rows; ++y)
+    for (int x = 0; x < marker.cols; ++x) label(x, y) = std::max(0, marker.at<int>(y, x));
+  return label;
+}
+
+[[noreturn]] void too_few(int found) {
+  throw Error(Code::BadInput, "found " + std::to_string(found) + " fibres in the micrograph, at least 4 are needed",
+              "template image", "use a sharp cross-section with fibres apart from each other, at least 12 pixels wide");
+}
+
+}  // namespace
+
+FibreMap find_fibres(const GrayImage& micrograph) {
+  if (micrograph.width < 16 || micrograph.height < 16) too_few(0);
+  cv::Mat gray = even_light(micrograph);
+  cv::Mat fibre;
+  cv::threshold(gray, fibre, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  if (!bright_is_fibre(fibre)) {
+    gray = 255 - gray;
+    fibre = ~fibre;
+  }
+  fill_small_holes(fibre, 2 * thickness(fibre));
+  cv::morphologyEx(fibre, fibre, cv::MORPH_OPEN, cv::getStructuringElement(cv::MORPH_ELLIPSE, {3, 3}));
+
+  int count = 0;
+  cv::Mat marker = markers(depth_of(fibre), count);
+  if (count < 4) too_few(count);
+  cv::Mat color;
+  cv::cvtColor(gray, color, cv::COLOR_GRAY2BGR);
+  cv::watershed(color, marker);
+
+  // cv::watershed gives each fibre some of the membrane, as far as the next fibre on flat ground; membranes belong to
+  // nobody, so they are cleared and then shared out evenly before anything is measured.
+  FibreMap map;
+  map.label = to_labels(marker);
+  const auto clear_membranes = [&](LabelImage& label) {
+    for (int y = 0; y < label.height; ++y)
+      for (int x = 0; x < label.width; ++x)
+        if (fibre.at<std::uint8_t>(y, x) == 0) label(x, y) = 0;
+  };
+  clear_membranes(map.label);
+  fill_gaps(map.label);
+  std::vector<Cell> cells = measure_cells(map.label, count);
+  std::vector<std::int64_t> areas;
+  for (const Cell& cell : cells) areas.push_back(cell.pixels);
+  const double typical_area = median(areas);
+  std::vector<char> sliver;
+  for (const Cell& cell : cells) sliver.push_back(static_cast<double>(cell.pixels) < 0.1 * typical_area);
+  map.fibres = merge_cells(map.label, count, sliver);
+  if (map.fibres < 4) too_few(map.fibres);
+  cells = measure_cells(map.label, map.fibres);
+  map.mean_pitch_px = mean_pitch(map.label, cells);
+  clear_membranes(map.label);
+  return map;
+}
+
+GrayImage read_gray(const std::filesystem::path& path) {
+  const std::string hint = "give a .png, .jpg, .tif or .bmp image";
+  cv::Mat image;
+  try {
+    image = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception& e) {
+    throw Error(Code::BadInput, "cannot read image: " + e.err, path.string(), hint);
+  }
+  if (image.empty()) throw Error(Code::BadInput, "cannot read image", path.string(), hint);
+  GrayImage gray(image.cols, image.rows);
+  for (int y = 0; y < image.rows; ++y) std::copy_n(image.ptr<std::uint8_t>(y), image.cols, &gray(0, y));
+  return gray;
+}
+
+void write_gray(const std::filesystem::path& path, const GrayImage& image) {
+  cv::Mat gray(image.height, image.width, CV_8U);
+  std::copy(image.pixels.begin(), image.pixels.end(), gray.begin<std::uint8_t>());
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", gray, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
+  OutputFile file(path);
+  file.write(std::as_bytes(std::span<const std::uint8_t>(bytes)));
+  file.commit();
+}
+
+std::filesystem::path bundled_micrograph() {
+  for (const char* assets : {FIBROLITE_INSTALL_ASSETS, FIBROLITE_SOURCE_ASSETS}) {
+    const std::filesystem::path path = std::filesystem::path(assets) / "textures" / "muscle.png";
+    if (std::filesystem::exists(path)) return path;
+  }
+  throw Error(Code::Internal, "the bundled micrograph is missing", FIBROLITE_INSTALL_ASSETS "/textures/muscle.png",
+              "reinstall, or name a template with mfs.template");
+}
+
+}  // namespace fibrolite

@@ -9,7 +9,7 @@
 
 namespace fibrolite {
 
-/// Fibres found in a template image.
+/// Fibres found in a template image (halved until its longest side is at most 2048 pixels).
 struct FibreMap {
   Image<std::int32_t> label;  ///< 0 = membrane, 1..fibres = fibre.
   int fibres = 0;
@@ -37,6 +37,8 @@ struct MembraneParams {
 
 /// 8-bit gray image from a .png, .jpg, .tif, .bmp file. @throws Error BadInput.
 [[nodiscard]] GrayImage read_gray(const std::filesystem::path& path);
+/// 8-bit PNG, whole or absent. @throws Error Io.
+void write_gray(const std::filesystem::path& path, const GrayImage& image);
 /// The micrograph that comes with the project (installed asset, or the one in the source tree). @throws Error Internal
 /// if missing.
 [[nodiscard]] std::filesystem::path bundled_micrograph();
