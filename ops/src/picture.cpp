@@ -1,1 +1,89 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <opencv2/imgcodecs.hpp>
+#include <span>
+#include <vector>
+
+#include "fibrolite/error.h"
+#include "fibrolite/file.h"
+#include "picture_raster.h"
+#include "picture_shade.h"
+#include "picture_view.h"
+
+namespace fibrolite {
+namespace {
+
+void check_params(const PictureParams& params) {
+  const auto in_range = [](int px) { return px >= 16 && px <= 8192; };
+  if (!in_range(params.width_px) || !in_range(params.height_px)) {
+    throw Error(Code::BadRecipe, "a picture has 16 to 8192 pixels along each side");
+  }
+  if (norm(params.up) == 0) throw Error(Code::BadRecipe, "the picture's up direction is zero");
+  if (!(params.margin >= 0 && params.margin < 0.5))
+    throw Error(Code::BadRecipe, "the picture's margin is 0 to below 0.5");
+}
+
+/// As many samples per pixel edge as about 150 MB of buffers allow, at most 3.
+int samples_per_pixel_edge(const PictureParams& params) {
+  const double pixels = static_cast<double>(params.width_px) * params.height_px;
+  return pixels <= 2.1e6 ? 3 : pixels <= 4.5e6 ? 2 : 1;
+}
+
+}  // namespace
+
+RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& color, const PictureParams& params,
+                 const Context& context) {
+  check_params(params);
+  const int samples = samples_per_pixel_edge(params);
+  const std::optional<CutPlane> cut = choose_cut(surface, solid, color, params, context.part(0, 0.1, ""));
+  const View view = choose_view(surface, cut, params, samples);
+  Raster raster(view.width, view.height);
+  raster.draw_surface(surface, view, cut, context.part(0.1, 0.3, ""));
+  context.progress(0.3);
+  if (cut) {
+    const double outline_mm = 1.7 * samples / view.samples_per_mm;
+    raster.draw_cap(solid, bounds(surface), view, *cut, outline_mm, context.part(0.3, 0.5, ""));
+  }
+  context.progress(0.5);
+  return shade(raster, surface, view, cut, color, params, samples, context.part(0.5, 1, ""));
+}
+
+void write_png(const std::filesystem::path& path, const RgbImage& image) {
+  OutputFile file(path);
+  std::vector<unsigned char> bytes;
+  try {
+    cv::Mat bgr(image.height, image.width, CV_8UC3);
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const Rgb c = image(x, y);
+        bgr.at<cv::Vec3b>(y, x) = {c.b, c.g, c.r};
+      }
+    }
+    if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 7})) {
+      throw Error(Code::Io, "the picture cannot be encoded", path.string());
+    }
+  } catch (const cv::Exception& error) {
+    throw Error(Code::Io, "the picture cannot be encoded: " + error.err, path.string());
+  }
+  file.write(std::as_bytes(std::span(bytes)));
+  file.commit();
+}
+
+// From the palette of Okabe and Ito (2008), made for colour-blind readers: cool colours for columns, warm and earthen
+// ones for bulk. Its vermilion is left to the joints.
+Rgb part_color(int id, bool column) {
+  static constexpr std::array<Rgb, 5> columns{
+      {{0, 114, 178}, {86, 180, 233}, {0, 158, 115}, {204, 121, 167}, {96, 96, 190}}};
+  static constexpr std::array<Rgb, 3> bulks{{{238, 196, 72}, {164, 140, 88}, {196, 206, 110}}};
+  const auto pick = [id](const auto& list) {
+    const int n = static_cast<int>(list.size());
+    return list[static_cast<std::size_t>(((id % n) + n) % n)];
+  };
+  return column ? pick(columns) : pick(bulks);
+}
+
+}  // namespace fibrolite

@@ -17,16 +17,19 @@ namespace fibrolite {
 struct PictureParams {
   int width_px = 1600, height_px = 1200;  ///< 16 to 8192.
   Vec3d up{0, 0, 1};                      ///< Unit.
-  /// Cut plane: material on the side the normal points to is taken away. Default: through the middle of the model,
-  /// across its smallest horizontal extent, seen from the open side.
+  /// Cut plane: material on the side the normal points to is taken away, and the picture is taken from there. Default:
+  /// vertical, across the smaller horizontal extent, in the middle half of it where most of every colour shows.
   std::optional<Vec3d> cut_point, cut_normal;
   bool cut = true;
+  double margin = 0.05;  ///< Share of the picture left free on each side; 0 to below 0.5.
 };
 /// Colour of the material at a point (by part, shell, joint).
 using PointColor = std::function<Rgb(Vec3d)>;
 
 /// Render the surface of `solid` with everything in front of the cut plane taken away, the cut face filled where the
-/// solid is. Cost: seconds for millions of triangles. The same bytes on any number of threads.
+/// solid is. Orthographic. `color` must be thread-safe; it is asked about once per pixel. Cost: seconds for millions of
+/// triangles, about 250 MB beside the mesh. The same bytes on any number of threads.
+/// @throws Error BadRecipe (a range above), Cancelled.
 [[nodiscard]] RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& color,
                                const PictureParams& params = {}, const Context& context = {});
 /// PNG, whole or absent. @throws Error Io.
