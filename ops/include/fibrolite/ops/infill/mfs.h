@@ -25,4 +25,9 @@ struct MfsParams {
 /// after setting up. Source: paper Sec. 5.1; sweep and distance image ours.
 [[nodiscard]] Fill generate(const Part& part, const MfsParams& params, const Shape& body, double shell_mm);
 
+/// The image swept along the axis; its middle lies at `center_mm` of the section, the centre line at (0, 0). A distance
+/// along smooth centre lines whose normal planes do not cross; beyond the image its rim is continued. Lipschitz
+/// constant about sqrt(2).
+[[nodiscard]] Shape sweep(MembraneImage image, const Axis& axis, Vec2d center_mm = {});
+
 }  // namespace fibrolite

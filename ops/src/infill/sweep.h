@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Coordinates across a limb: every point of space gets the place (u, v) where the limb's normal plane through it holds
+// it. Private to the fibre infill.
+#pragma once
+
+#include <vector>
+
+#include "fibrolite/frame.h"
+#include "fibrolite/ops/partition.h"
+#include "fibrolite/shape.h"
+
+namespace fibrolite {
+
+/// A rotation-minimising frame along a centre line (double reflection, Wang et al. 2008, "Computation of rotation
+/// minimizing frames"). Along a smooth line the map p -> (u, v) is the projection on the normal plane: 1-Lipschitz and
+/// constant along the limb's tangent, whatever the curvature, as long as the normal planes do not cross.
+class Sweep {
+ public:
+  explicit Sweep(const Axis& axis);
+  /// (u, v) of every point of the block, mm. Continuous inside the limb.
+  void map(const PointBlock& block, float* u, float* v) const;
+  /// The frame at a share of the line's length, 0 to 1; z along the limb.
+  [[nodiscard]] Frame frame_at(double share) const;
+
+ private:
+  /// Planes of stations k and k + 1 bound slab k; before the first and after the last plane the limb goes straight on.
+  struct Station {
+    Frame frame;                    // z is the tangent
+    double bend_u = 0, bend_v = 0;  // turn of the tangent towards u and v until the next station, rad
+  };
+  /// A station's frame in single precision: origin, tangent, u and v axis.
+  struct Plane {
+    float cx, cy, cz, tx, ty, tz, ux, uy, uz, vx, vy, vz;
+    explicit Plane(const Frame& frame);
+  };
+  [[nodiscard]] double distance_to_slab(int slab, Vec3d p) const;
+  [[nodiscard]] bool in_slab(int slab, Vec3d p) const;
+  void map_in_slab(int slab, const float* x, const float* y, const float* z, int count, float* u, float* v) const;
+  void map_in_run(int from, int to, const PointBlock& block, Vec3d center, double radius, float* u, float* v) const;
+  void map_by_distance(const std::vector<int>& slabs, const PointBlock& block, float* u, float* v) const;
+  [[nodiscard]] int last() const { return static_cast<int>(stations_.size()) - 1; }
+
+  std::vector<Station> stations_;
+  std::vector<Plane> planes_;  // one per station
+  double longest_slab_mm_ = 0;
+  std::vector<Frame> line_;  // at every point of the centre line
+  std::vector<double> arc_mm_;
+};
+
+}  // namespace fibrolite
