@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// A zip archive whose bytes depend on its content alone: fixed times, fixed blocks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fibrolite/file.h"
+
+namespace fibrolite {
+
+/// A stretch of a zip entry, deflated on its own, so that stretches can be made in parallel and put together in order.
+struct DeflatedPiece {
+  std::string bytes;
+  std::uint32_t crc = 0;
+  std::size_t raw_size = 0;
+};
+DeflatedPiece deflate_piece(std::string_view text);
+
+/// Why not libzip: it deflates on one thread and needs the whole text at once; a 3MF of 12 million triangles is 0.9 GB
+/// of text.
+class ZipWriter {
+ public:
+  explicit ZipWriter(OutputFile& file) : file_(&file) {}
+  /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB or more.
+  void add(const std::string& name, std::vector<DeflatedPiece> pieces);
+  void add(const std::string& name, std::string_view text) { add(name, {deflate_piece(text)}); }
+  /// The directory. Last.
+  void finish();
+
+ private:
+  OutputFile* file_;
+  std::uint64_t offset_ = 0;
+  std::string directory_;
+  std::uint16_t entries_ = 0;
+};
+
+}  // namespace fibrolite
