@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Speed and memory of whole runs: each case is a child process of `fibrolite generate`, beside the floor measured right
+// after it. Prints a table, writes bench.json. Never a test: machines differ; compare ratios of one run.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "child.h"
+#include "suite.h"
+#include "table.h"
+
+namespace {
+
+using namespace fibrolite::bench;
+namespace fs = std::filesystem;
+
+struct Options {
+  SuiteParams suite;
+  fs::path bin, out;
+  int repeats = 0, threads = 0;
+  std::string only;
+};
+
+std::string first_line(const fs::path& log) {
+  std::ifstream in(log);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+Run measure(const Case& c, const Options& options) {
+  const fs::path solid = options.out / "solid.stl", report = options.out / "report.json", log = options.out / "log.txt";
+  std::vector<std::string> command{options.bin / "fibrolite",
+                                   "generate",
+                                   c.model,
+                                   "-o",
+                                   solid,
+                                   "--report",
+                                   report,
+                                   "--size",
+                                   std::to_string(c.size_mm),
+                                   "--voxel",
+                                   std::to_string(c.voxel_mm),
+                                   "--infill",
+                                   c.infill,
+                                   "--preset",
+                                   c.preset,
+                                   "--overwrite",
+                                   "--quiet"};
+  if (options.threads > 0) command.insert(command.end(), {"--threads", std::to_string(options.threads)});
+  Run run;
+  run.program = fibrolite::bench::run(command, log);
+  fs::remove(solid);
+  if (run.program.exit_code != 0) {
+    run.failure = "exit " + std::to_string(run.program.exit_code) + ": " + first_line(log);
+    return run;
+  }
+  run.floor = fibrolite::bench::run(
+      {options.bin / "fibrolite-floor", c.model, std::to_string(c.size_mm), std::to_string(c.voxel_mm)}, log);
+  if (run.floor.exit_code != 0) {
+    run.failure = "floor: exit " + std::to_string(run.floor.exit_code) + ": " + first_line(log);
+    return run;
+  }
+  read_report(run, nlohmann::json::parse(std::ifstream(report)), nlohmann::json::parse(run.floor.output));
+  return run;
+}
+
+/// The run with the median ratio to its own floor.
+Run median(const Case& c, const Options& options) {
+  std::vector<Run> runs;
+  for (int i = 0; i < (options.repeats > 0 ? options.repeats : c.repeats); ++i) {
+    runs.push_back(measure(c, options));
+    if (!runs.back().failure.empty()) return runs.back();
+  }
+  std::ranges::sort(runs, {}, &Run::compute_ratio);
+  return runs[runs.size() / 2];
+}
+
+int bench(const Options& options) {
+  fs::create_directories(options.out);
+  nlohmann::json json{
+      {"cores", std::thread::hardware_concurrency()}, {"threads", options.threads}, {"cases", nlohmann::json::array()}};
+  int failed = 0;
+  print_head();
+  for (const Case& c : suite(options.suite)) {
+    if (!options.only.empty() && c.name.find(options.only) == std::string::npos) continue;
+    const Run run = median(c, options);
+    failed += run.failure.empty() ? 0 : 1;
+    print_row(c, run);
+    json["cases"].push_back(to_json(c, run));
+    std::ofstream(options.out / "bench.json") << json.dump(2) << '\n';
+  }
+  std::cout << "compute: stages without reading and writing files; x floor: compute over the floor's; process: whole "
+               "processes.\n"
+            << "written: " << (options.out / "bench.json").string() << '\n';
+  return failed == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  Options options;
+  options.bin = fs::canonical("/proc/self/exe").parent_path();
+  CLI::App app{"Speed and memory of whole runs, against the floor"};
+  app.add_option("--assets", options.suite.assets, "Folder of the bundled models")->required();
+  app.add_option("--models", options.suite.models,
+                 "Folder of models of your own; horse.ply, if there, carries the goals");
+  app.add_option("--out", options.out, "Folder for bench.json")->required();
+  app.add_option("--only", options.only, "Only cases whose name contains this");
+  app.add_option("--repeat", options.repeats, "Runs of each case, the median counts (default: 3 for peer-tcs, else 1)");
+  app.add_option("--threads", options.threads, "Threads of each run (default: all)");
+  app.add_flag("--quick", options.suite.quick, "A minute instead of many");
+  CLI11_PARSE(app, argc, argv)
+  return bench(options);
+} catch (const std::exception& error) {
+  std::cerr << "fibrolite-bench: " << error.what() << '\n';
+  return 1;
+}

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "suite.h"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+
+namespace fibrolite::bench {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> meshes(const fs::path& folder) {
+  constexpr std::array endings{".stl", ".obj", ".ply", ".off", ".3mf"};
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (std::ranges::find(endings, entry.path().extension()) != endings.end()) found.push_back(entry.path());
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+std::string label(double mm) {
+  std::string text = std::to_string(mm);
+  text.erase(text.find_last_not_of('0') + 1);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Case> suite(const SuiteParams& params) {
+  std::vector<fs::path> models = meshes(params.assets);
+  fs::path main_model = params.assets / "quadruped.ply";
+  if (params.models) {
+    models = meshes(*params.models);
+    if (fs::exists(*params.models / "horse.ply")) main_model = *params.models / "horse.ply";
+  }
+  if (!fs::exists(main_model)) throw std::runtime_error(main_model.string() + " is missing");
+
+  std::vector<Case> cases;
+  for (const double voxel_mm : {0.4, 0.2, 0.1}) {
+    if (params.quick && voxel_mm < 0.2) continue;
+    Case peer{.name = "peer-tcs " + label(voxel_mm),
+              .model = main_model,
+              .voxel_mm = voxel_mm,
+              .infill = "tcs",
+              .preset = "peer-tcs",
+              .repeats = 3,
+              .goals = {}};
+    if (voxel_mm < 0.4) peer.goals.floor_ratio = 2.0;
+    if (voxel_mm < 0.2) peer.goals.peak_rss_mb = 900;
+    cases.push_back(peer);
+  }
+  if (params.quick) {
+    cases.push_back({.name = "hybrid 100", .model = main_model, .voxel_mm = 0.25, .goals = {}});
+    return cases;
+  }
+  cases.push_back({.name = "hybrid 300",
+                   .model = main_model,
+                   .size_mm = 300,
+                   .voxel_mm = 0.4,
+                   .goals = {.floor_ratio = {}, .wall_s = 90, .partition_s = 30, .peak_rss_mb = {}}});
+  for (const char* infill : {"tcs", "mfs", "solid"}) {
+    cases.push_back({.name = infill, .model = main_model, .voxel_mm = 0.25, .infill = infill, .goals = {}});
+  }
+  for (const fs::path& model : models) {
+    cases.push_back({.name = "hybrid 100", .model = model, .voxel_mm = 0.25, .goals = {}});
+  }
+  return cases;
+}
+
+}  // namespace fibrolite::bench

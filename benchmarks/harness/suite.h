@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is run, and what it should reach.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fibrolite::bench {
+
+/// Upper bounds; none: only reported.
+struct Goals {
+  std::optional<double> floor_ratio;  ///< Compute stages over the floor's.
+  std::optional<double> wall_s;       ///< Of the whole process.
+  std::optional<double> partition_s;  ///< Everything that decides the parts, verification included.
+  std::optional<double> peak_rss_mb;
+};
+struct Case {
+  std::string name;
+  std::filesystem::path model;
+  double size_mm = 100;  ///< Longest side.
+  double voxel_mm = 0.2;
+  std::string infill = "hybrid", preset = "default";
+  int repeats = 1;  ///< The median is reported.
+  Goals goals;
+};
+struct SuiteParams {
+  std::filesystem::path assets;                 ///< Bundled models, .ply.
+  std::optional<std::filesystem::path> models;  ///< A folder of the user's.
+  bool quick = false;
+};
+/// The goals stand on the first case's model: horse.ply of the user's folder if it is there, else the bundled
+/// quadruped.
+/// @throws std::runtime_error: no model found.
+[[nodiscard]] std::vector<Case> suite(const SuiteParams& params);
+
+}  // namespace fibrolite::bench

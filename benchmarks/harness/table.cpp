@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "table.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace fibrolite::bench {
+namespace {
+
+// By the names that `fibrolite generate` gives its stages.
+bool moves_files(const std::string& stage) { return stage.starts_with("read") || stage.starts_with("write"); }
+bool decides_parts(const std::string& stage) {
+  constexpr std::array names{"proxy", "diameter", "partition", "verify"};
+  return std::ranges::find(names, stage) != names.end();
+}
+
+std::string number(double value, int decimals) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+  return text.data();
+}
+
+}  // namespace
+
+void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& floor) {
+  for (const auto& stage : report.at("stages")) {
+    run.stages.push_back({.name = stage.at("name"),
+                          .wall_s = stage.at("wall_s"),
+                          .cpu_s = stage.value("cpu_s", 0.0),
+                          .peak_rss_mb = stage.at("peak_rss_mb")});
+  }
+  for (const Stage& stage : run.stages) {
+    if (moves_files(stage.name)) {
+      run.files_s += stage.wall_s;
+      continue;
+    }
+    run.compute_s += stage.wall_s;
+    run.compute_cpu_s += stage.cpu_s;
+    if (decides_parts(stage.name)) run.partition_s += stage.wall_s;
+  }
+  run.active_voxels = report.at("solid").at("active_voxels");
+  run.triangles = report.at("mesh").at("triangles");
+  run.floor_compute_s = floor.at("compute_s");
+  run.floor_compute_cpu_s = floor.at("compute_cpu_s");
+}
+
+void print_head() {
+  std::printf("%-14s %-18s %6s %6s | %7s %7s %7s %7s | %7s %8s %8s | %8s %7s %7s\n", "case", "model", "size", "voxel",
+              "wall s", "CPU s", "compute", "files", "peak MB", "M voxels", "M tris", "floor s", "x floor", "process");
+}
+
+void print_row(const Case& c, const Run& run) {
+  const std::string model = c.model.stem().string();
+  if (!run.failure.empty()) {
+    std::printf("%-14s %-18s %6g %6g | %s\n", c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm,
+                run.failure.c_str());
+    return;
+  }
+  std::printf("%-14s %-18s %6g %6g | %7.2f %7.2f %7.2f %7.2f | %7.0f %8.2f %8.2f | %8.2f %7.2f %7.2f\n", c.name.c_str(),
+              model.c_str(), c.size_mm, c.voxel_mm, run.program.wall_s, run.program.cpu_s, run.compute_s, run.files_s,
+              run.program.peak_rss_mb, run.active_voxels / 1e6, run.triangles / 1e6, run.floor_compute_s,
+              run.compute_ratio(), run.process_ratio());
+  std::string line = "    wall/CPU s:";
+  for (const Stage& stage : run.stages)
+    line += "  " + stage.name + " " + number(stage.wall_s, 2) + "/" + number(stage.cpu_s, 2);
+  std::printf("%s\n", line.c_str());
+  bool met = true;
+  for (const std::string& verdict : judge(c, run, met)) std::printf("    goal: %s\n", verdict.c_str());
+  std::fflush(stdout);
+}
+
+std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
+  std::vector<std::string> verdicts;
+  const auto one = [&](const char* what, const std::optional<double>& bound, double value) {
+    if (!bound) return;
+    const bool ok = run.failure.empty() && value <= *bound;
+    met = met && ok;
+    verdicts.push_back(std::string(what) + " " + number(value, 2) + " of at most " + number(*bound, 0) +
+                       (ok ? ": ok" : ": missed"));
+  };
+  one("compute / floor", c.goals.floor_ratio, run.compute_ratio());
+  one("wall s", c.goals.wall_s, run.program.wall_s);
+  one("partition and verification s", c.goals.partition_s, run.partition_s);
+  one("peak MB", c.goals.peak_rss_mb, run.program.peak_rss_mb);
+  return verdicts;
+}
+
+nlohmann::json to_json(const Case& c, const Run& run) {
+  nlohmann::json json{{"name", c.name},       {"model", c.model.filename().string()},
+                      {"size_mm", c.size_mm}, {"voxel_mm", c.voxel_mm},
+                      {"infill", c.infill},   {"preset", c.preset},
+                      {"repeats", c.repeats}};
+  if (!run.failure.empty()) {
+    json["failure"] = run.failure;
+    return json;
+  }
+  json["stages"] = nlohmann::json::array();
+  for (const Stage& s : run.stages) {
+    json["stages"].push_back(
+        {{"name", s.name}, {"wall_s", s.wall_s}, {"cpu_s", s.cpu_s}, {"peak_rss_mb", s.peak_rss_mb}});
+  }
+  json["wall_s"] = run.program.wall_s;
+  json["cpu_s"] = run.program.cpu_s;
+  json["peak_rss_mb"] = run.program.peak_rss_mb;
+  json["compute_s"] = run.compute_s;
+  json["compute_cpu_s"] = run.compute_cpu_s;
+  json["files_s"] = run.files_s;
+  json["partition_s"] = run.partition_s;
+  json["active_voxels"] = run.active_voxels;
+  json["triangles"] = run.triangles;
+  json["floor"] = {{"wall_s", run.floor.wall_s},
+                   {"cpu_s", run.floor.cpu_s},
+                   {"peak_rss_mb", run.floor.peak_rss_mb},
+                   {"compute_s", run.floor_compute_s},
+                   {"compute_cpu_s", run.floor_compute_cpu_s}};
+  json["compute_ratio"] = run.compute_ratio();
+  json["process_ratio"] = run.process_ratio();
+  bool met = true;
+  json["goals"] = judge(c, run, met);
+  json["goals_met"] = met;
+  return json;
+}
+
+}  // namespace fibrolite::bench

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a case measured, as a row and as JSON.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "child.h"
+#include "suite.h"
+
+namespace fibrolite::bench {
+
+struct Stage {
+  std::string name;
+  double wall_s = 0, cpu_s = 0, peak_rss_mb = 0;
+};
+/// One run of the program and of the floor, in that order, by the same harness.
+struct Run {
+  ChildResult program, floor;
+  std::vector<Stage> stages;
+  double compute_s = 0, compute_cpu_s = 0;  ///< Stages that neither read nor write files.
+  double files_s = 0;                       ///< The others.
+  double partition_s = 0;                   ///< Stages that decide the parts.
+  double active_voxels = 0, triangles = 0;
+  double floor_compute_s = 0, floor_compute_cpu_s = 0;
+  std::string failure;  ///< Empty if both ended well.
+
+  [[nodiscard]] double compute_ratio() const { return compute_s / floor_compute_s; }
+  [[nodiscard]] double process_ratio() const { return program.wall_s / floor.wall_s; }
+};
+/// Fill in what the program's report and the floor's answer say.
+void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& floor);
+
+void print_head();
+void print_row(const Case& c, const Run& run);
+[[nodiscard]] nlohmann::json to_json(const Case& c, const Run& run);
+/// Each goal with its figure, and whether all were met.
+[[nodiscard]] std::vector<std::string> judge(const Case& c, const Run& run, bool& met);
+
+}  // namespace fibrolite::bench

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Distance of the two structures, a point and a block of 512 at a time. Items are points.
+#include <benchmark/benchmark.h>
+
+#include <array>
+
+#include "fibrolite/ops/infill/mfs.h"
+#include "fibrolite/ops/infill/tcs.h"
+#include "fibrolite/ops/verify.h"
+#include "fibrolite/realize.h"
+#include "fibrolite/surface.h"
+
+namespace {
+
+using namespace fibrolite;
+
+/// The samples of one leaf.
+struct Leaf {
+  static constexpr double voxel_mm = 0.1;
+  std::array<float, PointBlock::capacity> x{}, y{}, z{};
+  Vec3i origin{24, -16, 8};
+
+  Leaf() {
+    for (int n = 0; n < PointBlock::capacity; ++n) {
+      const auto i = static_cast<std::size_t>(n);
+      x[i] = static_cast<float>(voxel_mm * (origin.x + n / 64));
+      y[i] = static_cast<float>(voxel_mm * (origin.y + n / 8 % 8));
+      z[i] = static_cast<float>(voxel_mm * (origin.z + n % 8));
+    }
+  }
+  [[nodiscard]] PointBlock block() const {
+    return {.x = x.data(),
+            .y = y.data(),
+            .z = z.data(),
+            .count = PointBlock::capacity,
+            .leaf = &origin,
+            .voxel_mm = voxel_mm};
+  }
+};
+
+void per_block(benchmark::State& state, const Shape& shape) {
+  const Leaf leaf;
+  std::array<float, PointBlock::capacity> out{};
+  for (auto _ : state) {
+    shape.evaluate(leaf.block(), out.data());
+    benchmark::DoNotOptimize(out);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * PointBlock::capacity);
+}
+
+void per_point(benchmark::State& state, const Shape& shape) {
+  Vec3d p{1, 2, 3};
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(shape(p));
+    p.x = p.x > 4 ? 1 : p.x + 0.01;
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+/// Membranes through a cylinder of 20 mm.
+Shape membranes() {
+  const Shape rod = cylinder({0, 0, -30}, {0, 0, 30}, 10);
+  const Solid solid = realize(rod, Box3d{{-12, -12, -32}, {12, 12, 32}}, Grid{.voxel_mm = 0.5});
+  const Parts parts = whole_body(make_proxy(surface(solid)), Kind::Column);
+  return generate(parts.parts.front(), MfsParams{}, rod, 1.0).shape;
+}
+
+void tcs_block(benchmark::State& state) { per_block(state, crystal({})); }
+void tcs_point(benchmark::State& state) { per_point(state, crystal({})); }
+void mfs_block(benchmark::State& state) { per_block(state, membranes()); }
+void mfs_point(benchmark::State& state) { per_point(state, membranes()); }
+BENCHMARK(tcs_block);
+BENCHMARK(tcs_point);
+BENCHMARK(mfs_block);
+BENCHMARK(mfs_point);
+
+}  // namespace
