@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "fibrolite/blocks.h"
 #include "fibrolite/error.h"
 #include "vdb_access.h"
 
@@ -153,20 +154,8 @@ Solid realize(const Shape& shape, const Box3d& region_mm, Grid grid, const Conte
 }
 
 Solid realize(const Shape& shape, const Solid& body, const Context& context) {
-  const Tree& tree = body.impl().grid->tree();
   std::vector<openvdb::Coord> origins;
-  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile >= 0) continue;
-    const openvdb::CoordBBox box = tile.getBoundingBox();
-    for (int x = box.min().x(); x <= box.max().x(); x += 8) {
-      for (int y = box.min().y(); y <= box.max().y(); y += 8) {
-        for (int z = box.min().z(); z <= box.max().z(); z += 8) origins.emplace_back(x, y, z);
-      }
-    }
-  }
+  for (const Vec3i o : blocks(body)) origins.emplace_back(o.x, o.y, o.z);
   return Blocks(shape, body.grid(), context).run(origins);
 }
 

@@ -86,6 +86,35 @@ struct SolidDistance final : Shape::Function {
   Solid solid;
 };
 
+/// Filled part of a leaf, voxels. A sample counts with clamp(1/2 - m, 0, 1), m the mean distance over its voxel: the
+/// distance at the sample plus 1/24 of the Laplacian, which takes the error of curved surfaces from second to fourth
+/// order.
+double filled(const Leaf& leaf, openvdb::tree::ValueAccessor<const Tree>& access, float inverse) {
+  const float* v = leaf.buffer().data();
+  double sum = 0;
+  for (openvdb::Index k = 0; k < Leaf::SIZE; ++k) {
+    float d = v[k] * inverse;
+    if (std::abs(d) < 1.5F) {
+      const openvdb::Index x = k >> 6, y = (k >> 3) & 7U, z = k & 7U;
+      const bool inner = x > 0 && x < 7 && y > 0 && y < 7 && z > 0 && z < 7;
+      float around = 0;
+      if (inner) {
+        around = v[k - 64] + v[k + 64] + v[k - 8] + v[k + 8] + v[k - 1] + v[k + 1];
+      } else {
+        const openvdb::Coord at = leaf.offsetToGlobalCoord(k);
+        for (int axis = 0; axis < 3; ++axis) {
+          openvdb::Coord step(0);
+          step[axis] = 1;
+          around += access.getValue(at - step) + access.getValue(at + step);
+        }
+      }
+      d += (around * inverse - 6 * d) * (1.0F / 24.0F);
+    }
+    sum += std::clamp(0.5F - d, 0.0F, 1.0F);
+  }
+  return sum;
+}
+
 }  // namespace
 
 void initialize_openvdb() {
@@ -145,13 +174,9 @@ double Solid::volume_mm3() const {
   // One number per leaf, summed in order: the same bits on any number of threads.
   std::vector<double> part(leaves.leafCount(), 0.0);
   const auto inverse = static_cast<float>(1.0 / h);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size()), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const float* v = leaves.leaf(i).buffer().data();
-      double sum = 0;
-      for (openvdb::Index k = 0; k < Leaf::SIZE; ++k) sum += std::clamp(0.5F - v[k] * inverse, 0.0F, 1.0F);
-      part[i] = sum;
-    }
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size(), 64), [&](const auto& range) {
+    openvdb::tree::ValueAccessor<const Tree> access(tree);
+    for (std::size_t i = range.begin(); i < range.end(); ++i) part[i] = filled(leaves.leaf(i), access, inverse);
   });
   double voxels = 0;
   for (const double v : part) voxels += v;

@@ -31,7 +31,7 @@ double twice_area(const Points& points, openvdb::Index32 a, openvdb::Index32 b, 
 /// vector. The factor is the one that keeps the volume of spheres and cylinders two to eight voxels thick
 /// (tests/engine/surface_test.cpp).
 void inflate(Points& points, const Quads& quads, double voxel) {
-  constexpr double factor = 0.62;
+  constexpr double factor = 1.0;
   struct Umbrella {
     float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours
     float nx = 0, ny = 0, nz = 0;  // sum of quad normals

@@ -1,1 +1,78 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The method on one screen (paper Fig. 1).
+#include "fibrolite/ops/hybridize.h"
+
+#include <algorithm>
+
+#include "fibrolite/ops/assemble.h"
+#include "fibrolite/ops/measure.h"
+#include "fibrolite/ops/tie.h"
+#include "fibrolite/realize.h"
+#include "fibrolite/to_solid.h"
+#include "fibrolite/winding.h"
+#include "run.h"
+
+namespace fibrolite {
+
+Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report, const Context& context) {
+  const Recipe& recipe = params.recipe;
+  const double voxel = choose_voxel(bounds(model.mesh), recipe, params.infill, params.voxel_mm);
+  check_recipe(recipe, voxel, params.infill);
+  Run run(report, context);
+  Hybrid out;
+
+  // Parts (paper Sec. 4): everything that must not depend on the voxel is decided on a proxy and on the mesh itself.
+  if (params.infill == InfillKind::Hybrid) {
+    const Proxy proxy = run("proxy", 0.02, [&](const Context& c) { return make_proxy(model.mesh, {}, c); });
+    const DiameterField field = run("diameter", 0.08, [&](const Context& c) { return diameter(proxy.surface, {}, c); });
+    const Partition cut =
+        run("partition", 0.12, [&](const Context& c) { return partition(proxy, field, recipe.partition, c); });
+    const Verification verified =
+        run("verify", 0.35, [&](const Context& c) { return verify(proxy, cut, recipe.verify, recipe.material, c); });
+    report_decisions(cut, verified, report);
+    out.parts = verified.parts;
+  } else {
+    out.parts = whole_body(model.mesh, params.infill == InfillKind::Mfs ? Kind::Column : Kind::Bulk);
+  }
+
+  // Interiors and joints (paper Sec. 5 and 6), as distance functions.
+  const bool sections = params.infill == InfillKind::Hybrid || params.infill == InfillKind::Mfs;
+  if (sections) out.body = distance_to(WindingTree(model.mesh));
+  std::vector<Fill> fills;
+  run("infill", 0.40, [&](const Context&) {
+    for (const Part& part : out.parts.parts) fills.push_back(fill(part, params.infill, recipe, out.body));
+  });
+  run("joints", 0.45, [&](const Context& c) {
+    if (!recipe.joint.enabled || out.parts.parts.size() < 2) return;
+    out.interfaces = interfaces(out.parts, out.body, section_pixel(recipe), c);
+    out.joints = join_all(out.parts, out.interfaces, fills, recipe, out.body, c);
+  });
+
+  // One composed shape, made into voxels once, in one piece.
+  const Grid grid{.voxel_mm = voxel};
+  const double shell_mm = recipe.shell.thickness_mm;
+  const Solid body = run("body", 0.60, [&](const Context& c) {
+    ToSolidResult made = to_solid(model.mesh, {.grid = grid, .inside_band_mm = shell_mm}, c);
+    report.model.repairs.insert(report.model.repairs.end(), made.repairs.begin(), made.repairs.end());
+    return made.solid;
+  });
+  const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
+  const Shape whole = compose(distance_to(body), out.parts, fills, out.joints, params.infill, assembly);
+  const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
+  const Tied tied = run("one piece", 0.95, [&](const Context& c) {
+    return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm}, c);
+  });
+  out.solid = tied.solid;
+
+  run("measure", 1.0, [&](const Context& c) {
+    std::vector<Shape> regions;
+    for (const Part& part : out.parts.parts) regions.push_back(part.region());
+    report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
+    report_joints(out.interfaces, out.joints, report);
+    report_solid(tied, body, recipe.material, report);
+  });
+  if (params.steps) out.steps = steps(body, raw, out, fills, tied.struts, assembly);
+  return out;
+}
+
+}  // namespace fibrolite

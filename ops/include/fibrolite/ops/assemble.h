@@ -16,8 +16,13 @@ struct FilledRegion {
   Shape region;  ///< p_i.
   Shape fill;    ///< Unclipped.
 };
+/// One part's fill, clipped to the part: max(fill_i, p_i - overlap).
+[[nodiscard]] Shape clip(const FilledRegion& part, const AssembleParams& params);
+/// The shell alone: max(b, -(b + t)), two isovalues of one distance.
+[[nodiscard]] Shape shell(const Shape& body, double thickness_mm);
 /// max(b, min(-(b + t), min_i max(fill_i, p_i - overlap), joints)). Conservative: zero set and sign are right.
-/// Source: algorithms of the project, docs/architecture.md.
+/// Cost: one evaluation of b and, deeper than t/2, of the fills
+/// and joints near the block. Source: ours (docs/architecture.md); the paper's Sec. 5.2 and 6 as level-set operations.
 [[nodiscard]] Shape assemble(const Shape& body, const std::vector<FilledRegion>& parts,
                              const std::vector<Shape>& joints, const AssembleParams& params);
 

@@ -30,8 +30,10 @@ struct Hybrid {
   Parts parts;
   std::vector<Interface> interfaces;
   std::vector<Joint> joints;
-  std::vector<NamedSolid> steps;  ///< body, shell, fill_<id>, layer_<n>, columns_<n>, solid; if asked for.
-  Shape body;                     ///< Distance to the model, for pictures.
+  /// If asked for: body, shell, fill_<part>, joint_<n>, ties, specks (removed), pores (filled), solid. The union of
+  /// shell, fills, joints, ties and pores less the specks is the solid.
+  std::vector<NamedSolid> steps;
+  Shape body;  ///< Distance to the model, for pictures.
 };
 /// Model -> printed solid. Fills in everything of `report` but the mesh block.
 /// @throws Error of every stage. Cost: see docs/performance.md.
@@ -39,7 +41,8 @@ struct Hybrid {
                                const Context& context = {});
 
 /// The voxel a run will use, mm.
-[[nodiscard]] double choose_voxel(const Box3d& model, const Recipe& recipe, std::optional<double> wanted);
+[[nodiscard]] double choose_voxel(const Box3d& model, const Recipe& recipe, InfillKind infill,
+                                  std::optional<double> wanted);
 /// Memory a run will need at most, bytes, predicted from area, volume and voxel before anything is allocated.
 [[nodiscard]] double predict_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill);
 

@@ -38,5 +38,7 @@ struct Verification {
 /// The whole body as one part of a given kind, for runs that skip partition and verification. A column's axis is the
 /// longest principal axis of the body.
 [[nodiscard]] Parts whole_body(const Proxy& proxy, Kind kind);
+/// The same from a closed mesh, for runs that need no proxy. Cost: O(triangles).
+[[nodiscard]] Parts whole_body(const Mesh& model, Kind kind);
 
 }  // namespace fibrolite

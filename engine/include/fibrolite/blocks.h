@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Visiting a solid block by block, for measurements that need more than one shape at the same samples.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "fibrolite/shape.h"
+#include "fibrolite/solid.h"
+
+namespace fibrolite {
+
+/// Index-space origins (multiples of 8) of all 8x8x8 blocks that hold a sample inside or a band sample of the solid, in
+/// the tree's order. Cost: O(blocks).
+[[nodiscard]] std::vector<Vec3i> blocks(const Solid& solid);
+
+/// Call visit(number, block) for every origin, in parallel; `block` carries the 512 sample points of its lattice.
+void for_each_block(const std::vector<Vec3i>& origins, double voxel_mm,
+                    const std::function<void(std::size_t number, const PointBlock& block)>& visit);
+
+}  // namespace fibrolite

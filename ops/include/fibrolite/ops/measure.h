@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How much material is where, on the finished solid.
+#pragma once
+
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/shape.h"
+#include "fibrolite/solid.h"
+
+namespace fibrolite {
+
+struct PartVolumes {
+  double part_mm3 = 0;    ///< Of the body that belongs to the part.
+  double lumen_mm3 = 0;   ///< Of that, deeper than the shell.
+  double infill_mm3 = 0;  ///< Material in the lumen (fills, joints and ties).
+  Vec3d centroid_mm{};    ///< Of part_mm3.
+};
+/// One entry per region; a point belongs to the region with the least value. `body` and `solid` share one lattice.
+/// Samples near a surface count in part. Cost: O(samples inside the body), parallel; the same bits on any number of
+/// threads.
+[[nodiscard]] std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
+                                               double shell_mm, const Context& context = {});
+
+}  // namespace fibrolite

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "run.h"
+
+#include <algorithm>
+
+#include "fibrolite/realize.h"
+
+namespace fibrolite {
+
+std::string infill_of(const Part& part, InfillKind run) {
+  switch (run) {
+    case InfillKind::Hybrid:
+      return part.kind() == Kind::Column ? "mfs" : "tcs";
+    case InfillKind::Tcs:
+      return "tcs";
+    case InfillKind::Mfs:
+      return "mfs";
+    case InfillKind::Solid:
+      return "solid";
+  }
+  return {};
+}
+
+Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body) {
+  const std::string name = infill_of(part, run);
+  if (name == "tcs") return generate(part, recipe.tcs);
+  if (name == "mfs") return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
+  return {everything(), 0, {}};
+}
+
+double section_pixel(const Recipe& recipe) { return std::min(0.25 * recipe.mfs.wall_mm, 0.1); }
+
+double tie_mm(const Recipe& recipe, double voxel_mm) { return std::max(recipe.tcs.stick_mm, 2 * voxel_mm); }
+
+std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
+                            const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
+                            const Context& context) {
+  std::vector<Joint> joints;
+  for (std::size_t i = 0; i < interfaces.size(); ++i) {
+    const Interface& at = interfaces[i];
+    const auto a = static_cast<std::size_t>(at.a), b = static_cast<std::size_t>(at.b);
+    const bool crystal_a = parts.parts[a].kind() == Kind::Bulk, crystal_b = parts.parts[b].kind() == Kind::Bulk;
+    joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal_a, crystal_b, recipe.tcs.stick_mm, body,
+                          recipe.shell.thickness_mm, recipe.seed, static_cast<int>(i), recipe.joint, context));
+    context.progress(static_cast<double>(i + 1) / static_cast<double>(interfaces.size()));
+  }
+  return joints;
+}
+
+Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills, const std::vector<Joint>& joints,
+              InfillKind infill, const AssembleParams& params) {
+  if (infill == InfillKind::Solid) return body;
+  std::vector<FilledRegion> filled;
+  for (std::size_t i = 0; i < fills.size(); ++i) filled.push_back({parts.parts[i].region(), fills[i].shape});
+  std::vector<Shape> shapes;
+  for (const Joint& joint : joints) shapes.push_back(joint.shape);
+  return assemble(body, filled, shapes, params);
+}
+
+std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made, const std::vector<Fill>& fills,
+                              const std::vector<Capsule>& struts, const AssembleParams& params) {
+  const Shape b = distance_to(body);
+  std::vector<NamedSolid> result;
+  const auto add = [&](const std::string& name, const Shape& shape) {
+    result.push_back({name, realize(intersect({b, shape}), body)});
+  };
+  add("body", b);
+  add("shell", shell(b, params.shell_mm));
+  for (std::size_t i = 0; i < fills.size(); ++i) {
+    add("fill_" + std::to_string(i), clip({made.parts.parts[i].region(), fills[i].shape}, params));
+  }
+  for (std::size_t i = 0; i < made.joints.size(); ++i) add("joint_" + std::to_string(i), made.joints[i].shape);
+  if (!struts.empty()) add("ties", capsules(struts));
+  // What mending changed: material that went, void that was filled.
+  const Shape before = struts.empty() ? distance_to(raw) : unite({distance_to(raw), intersect({b, capsules(struts)})});
+  const Shape after = distance_to(made.solid);
+  for (const auto& [name, change] :
+       {std::pair("specks", subtract(before, after)), std::pair("pores", subtract(after, before))}) {
+    const Solid changed = realize(change, body);
+    if (changed.volume_mm3() > 0) result.push_back({name, changed});
+  }
+  result.push_back({"solid", made.solid});
+  return result;
+}
+
+}  // namespace fibrolite

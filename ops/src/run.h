@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The small verbs of hybridize(): timed stages, the choice of an infill per part, composition, and what goes into the
+// report.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fibrolite/ops/assemble.h"
+#include "fibrolite/ops/fill.h"
+#include "fibrolite/ops/hybridize.h"
+#include "fibrolite/ops/measure.h"
+#include "fibrolite/ops/tie.h"
+
+namespace fibrolite {
+
+/// Runs stages one after the other: each is timed into the report and moves the progress to `until`.
+class Run {
+ public:
+  Run(Report& report, const Context& context) : watch_(report.stages), context_(context) {}
+  template <class Work>
+  auto operator()(const char* name, double until, Work&& work) {
+    const Context part = context_.part(from_, until, name);
+    from_ = until;
+    context_.check();
+    return watch_(name, [&] { return work(part); });
+  }
+
+ private:
+  Stopwatch watch_;
+  Context context_;
+  double from_ = 0;
+};
+
+/// "mfs", "tcs" or "solid": what a part gets in a run.
+[[nodiscard]] std::string infill_of(const Part& part, InfillKind run);
+[[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body);
+
+/// Edge of a section's pixel, mm: min(wall / 4, 0.1), whatever the voxel.
+[[nodiscard]] double section_pixel(const Recipe& recipe);
+[[nodiscard]] std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
+                                          const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
+                                          const Context& context);
+/// Diameter of a tie: the thinnest member of the recipe, at least two voxels.
+[[nodiscard]] double tie_mm(const Recipe& recipe, double voxel_mm);
+
+[[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
+                            const std::vector<Joint>& joints, InfillKind infill, const AssembleParams& params);
+/// Every step as a grid of its own (see Hybrid::steps).
+[[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
+                                            const std::vector<Fill>& fills, const std::vector<Capsule>& struts,
+                                            const AssembleParams& params);
+
+void report_decisions(const Partition& partition, const Verification& verification, Report& report);
+void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std::vector<PartVolumes>& volumes,
+                  InfillKind infill, Report& report);
+void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints, Report& report);
+void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
+
+}  // namespace fibrolite

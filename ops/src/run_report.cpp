@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What hybridize() measured, into the report.
+#include <algorithm>
+#include <cmath>
+
+#include "run.h"
+
+namespace fibrolite {
+namespace {
+
+void append(std::vector<std::string>& to, const std::vector<std::string>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+}  // namespace
+
+void report_decisions(const Partition& partition, const Verification& verification, Report& report) {
+  report.threshold = partition.threshold;
+  report.stable_from = partition.stable_from;
+  report.stable_to = partition.stable_to;
+  append(report.warnings, partition.notes);
+  append(report.warnings, verification.notes);
+}
+
+void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std::vector<PartVolumes>& volumes,
+                  InfillKind infill, Report& report) {
+  for (std::size_t i = 0; i < parts.parts.size(); ++i) {
+    const Part& part = parts.parts[i];
+    PartReport row;
+    row.id = part.id();
+    row.kind = name(part.kind());
+    row.infill = infill_of(part, infill);
+    row.volume_mm3 = volumes[i].part_mm3;
+    row.lumen_mm3 = volumes[i].lumen_mm3;
+    row.infill_volume_mm3 = volumes[i].infill_mm3;
+    row.fibres = fills[i].fibres;
+    row.centroid_mm = volumes[i].centroid_mm;
+    row.axis = part.axis().mean();
+    row.diameter_mm = part.diameter_mm();
+    row.stress = part.stress();
+    row.reason = part.reason();
+    report.parts.push_back(row);
+    append(report.warnings, fills[i].warnings);
+  }
+}
+
+void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints, Report& report) {
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const Joint& joint = joints[i];
+    InterfaceReport row;
+    row.a = interfaces[i].a;
+    row.b = interfaces[i].b;
+    row.centroid_mm = interfaces[i].frame.origin;
+    row.normal = interfaces[i].frame.z;
+    row.area_mm2 = interfaces[i].area_mm2;
+    row.regions_before = joint.layer.regions_before;
+    row.regions_after = joint.layer.regions_after;
+    row.columns = static_cast<int>(joint.columns.size());
+    row.columns_dropped = joint.columns_dropped;
+    row.union_area_mm2 = joint.layer.union_area_mm2;
+    row.bridge_area_mm2 = joint.layer.bridge_area_mm2;
+    row.layer_area_mm2 =
+        joint.layer.pixel_mm * joint.layer.pixel_mm *
+        static_cast<double>(std::count(joint.layer.solid.pixels.begin(), joint.layer.solid.pixels.end(), 1));
+    row.contact_area_mm2 = joint.contact_area_mm2;
+    report.interfaces.push_back(row);
+    append(report.warnings, joint.warnings);
+  }
+}
+
+void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report) {
+  SolidReport& out = report.solid;
+  const double body_mm3 = body.volume_mm3();
+  out.volume_mm3 = tied.solid.volume_mm3();
+  out.fill_ratio = body_mm3 > 0 ? out.volume_mm3 / body_mm3 : 0;
+  out.mass_g = out.volume_mm3 * 1e-3 * material.density_g_cm3;
+  out.pieces = static_cast<std::int64_t>(tied.left.material.size());
+  out.cavities = static_cast<std::int64_t>(tied.left.cavities.size());
+  for (const Piece& cavity : tied.left.cavities) out.cavity_volume_mm3 += cavity.volume_mm3;
+  out.ties = static_cast<std::int64_t>(tied.struts.size());
+  out.specks_removed = tied.dropped;
+  out.voids_filled = tied.filled;
+  out.active_voxels = tied.solid.active_voxels();
+  out.voxel_mm = body.grid().voxel_mm;
+  report.model.volume_mm3 = body_mm3;
+  if (out.pieces > 1) {
+    report.warnings.push_back("the solid has " + std::to_string(out.pieces) +
+                              " pieces: the model itself has pieces too far apart to tie");
+  }
+}
+
+}  // namespace fibrolite
