@@ -1,1 +1,106 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The transient layer of a joint (paper Sec. 6.1).
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "bridges.h"
+#include "fibrolite/ops/joint.h"
+#include "plane_image.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr int rim_px = 3;             // how far the layer reaches beyond the body, so that clipping closes it
+constexpr std::int64_t least_px = 3;  // smaller regions are grazes of a stick, not material
+
+/// The body's section that the interface stands for: the region of the disc whose centroid is nearest the frame's
+/// origin.
+Image<std::uint8_t> own_section(const PlaneGrid& grid, const FloatImage& depth, double radius_mm) {
+  Image<std::uint8_t> inside(grid.width, grid.height);
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i) inside(i, j) = depth(i, j) <= 0 && norm(grid.local(i, j)) <= radius_mm;
+  const Regions found = regions_of(inside);
+  std::vector<Vec2d> center(static_cast<std::size_t>(found.count));
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i)
+      if (const int r = found.label(i, j); r > 0) {
+        const auto k = static_cast<std::size_t>(r - 1);
+        center[k] = center[k] + (1.0 / static_cast<double>(found.pixels[k])) * grid.local(i, j);
+      }
+  const auto nearest =
+      std::min_element(center.begin(), center.end(), [](Vec2d a, Vec2d b) { return dot(a, a) < dot(b, b); });
+  const int own = nearest == center.end() ? 0 : static_cast<int>(nearest - center.begin()) + 1;
+  for (std::size_t i = 0; i < inside.pixels.size(); ++i) inside.pixels[i] = own > 0 && found.label.pixels[i] == own;
+  return inside;
+}
+
+/// Signed distance (mm) to the mask grown by rim_px; negative inside.
+FloatImage rim_distance(const Image<std::uint8_t>& mask, double pixel_mm) {
+  cv::Mat inside(mask.height, mask.width, CV_8U), outside, within, without;
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x) inside.at<std::uint8_t>(y, x) = mask(x, y) != 0 ? 255 : 0;
+  cv::bitwise_not(inside, outside);
+  cv::distanceTransform(inside, within, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  cv::distanceTransform(outside, without, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  FloatImage distance(mask.width, mask.height);
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x)
+      distance(x, y) = static_cast<float>((without.at<float>(y, x) - within.at<float>(y, x) - rim_px) * pixel_mm);
+  return distance;
+}
+
+/// Take regions of a few pixels out of the layer, from its distance too.
+void drop_grazes(Layer& layer) {
+  const Regions found = regions_of(layer.solid);
+  for (std::size_t i = 0; i < layer.solid.pixels.size(); ++i) {
+    const int r = found.label.pixels[i];
+    if (r == 0 || found.pixels[static_cast<std::size_t>(r - 1)] >= least_px) continue;
+    layer.solid.pixels[i] = 0;
+    layer.distance_mm.pixels[i] = static_cast<float>(0.25 * layer.pixel_mm);
+  }
+}
+
+std::int64_t area_px(const Layer& layer) { return std::count(layer.solid.pixels.begin(), layer.solid.pixels.end(), 1); }
+
+}  // namespace
+
+int regions(const Layer& layer) { return regions_of(layer.solid).count; }
+
+Layer transient_layer(const Interface& interface, const Shape& fill_a, const Shape& fill_b, const Shape& body,
+                      double shell_mm, double pixel_mm, const JointParams& params) {
+  const PlaneGrid grid = PlaneGrid::about(interface.frame, interface.radius_mm, pixel_mm, rim_px + 3);
+  const FloatImage depth = sample(body, grid), a = sample(fill_a, grid), b = sample(fill_b, grid);
+  const Image<std::uint8_t> section = own_section(grid, depth, interface.radius_mm + pixel_mm);
+  const FloatImage rim = rim_distance(section, pixel_mm);
+
+  Layer layer;
+  layer.origin_mm = grid.corner_mm;
+  layer.pixel_mm = pixel_mm;
+  layer.solid = Image<std::uint8_t>(grid.width, grid.height);
+  layer.distance_mm = FloatImage(grid.width, grid.height);
+  for (std::size_t i = 0; i < section.pixels.size(); ++i) {
+    // Outside the body the shell's ring goes on to the rim; assemble() clips it.
+    const float ring = -(depth.pixels[i] + static_cast<float>(shell_mm));
+    const float joined = std::min({a.pixels[i], b.pixels[i], ring});
+    layer.distance_mm.pixels[i] = joined;
+    layer.solid.pixels[i] = section.pixels[i] != 0 && joined < 0;
+  }
+  drop_grazes(layer);
+  const double pixel_area = pixel_mm * pixel_mm;
+  const std::int64_t union_px = area_px(layer);
+  layer.regions_before = regions(layer);
+  layer.union_area_mm2 = static_cast<double>(union_px) * pixel_area;
+  join_regions(layer, section, params.bridge, params.min_wall_mm);
+  layer.bridge_area_mm2 = static_cast<double>(area_px(layer) - union_px) * pixel_area;
+  layer.regions_after = regions(layer);
+  // Bridges were drawn only that far around themselves: beyond, nothing larger may be claimed.
+  const auto cap = static_cast<float>(Layer::cap_px * pixel_mm);
+  for (std::size_t i = 0; i < rim.pixels.size(); ++i)
+    layer.distance_mm.pixels[i] = std::max(std::min(layer.distance_mm.pixels[i], cap), rim.pixels[i]);
+  return layer;
+}
+
+}  // namespace fibrolite

@@ -17,6 +17,11 @@ struct Interface {
   double radius_mm = 0;  ///< Of the disc that covers the section.
   double area_mm2 = 0;   ///< Of the body's section.
 };
+/// The sections of the body in the plane of one cut, where it parts cut.a from cut.b; sampled at `pixel_mm` (coarser
+/// for a disc wider than 3000 pixels). Sections below 16 pixels are left out.
+[[nodiscard]] std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const Shape& body,
+                                                 double pixel_mm);
+
 /// `body` must not depend on the voxel (distance to the mesh). Sampled at `pixel_mm`. Sorted by (a, b, centroid).
 [[nodiscard]] std::vector<Interface> interfaces(const Parts& parts, const Shape& body, double pixel_mm,
                                                 const Context& context = {});

@@ -27,8 +27,10 @@ struct JointParams {
 
 /// The transient layer as a binary section image in the interface's frame (paper Sec. 6.1), and how it was joined.
 struct Layer {
-  Image<std::uint8_t> solid;  ///< 1 = material.
-  Vec2d origin_mm{};          ///< Local coordinates of pixel (0, 0)'s centre.
+  static constexpr int cap_px = 3;  ///< Largest distance kept inside the section, pixels.
+  Image<std::uint8_t> solid;        ///< 1 = material; inside the body's section only.
+  FloatImage distance_mm;  ///< Of the same layer, sub-pixel, negative in material; reaches a little beyond the body.
+  Vec2d origin_mm{};       ///< Local coordinates of pixel (0, 0)'s centre.
   double pixel_mm = 0.1;
   int regions_before = 0, regions_after = 0;
   double union_area_mm2 = 0, bridge_area_mm2 = 0;
@@ -39,6 +41,7 @@ struct Layer {
 
 /// US = S_a | S_b | shell ring inside the body's section, then bridges until one region is left.
 /// `fill_a`, `fill_b`: unclipped structures; `body`: distance to the mesh; shell ring = { -shell_mm <= body <= 0 }.
+/// Regions below 3 pixels are dropped. @throws Error BadRecipe (a range above).
 [[nodiscard]] Layer transient_layer(const Interface& interface, const Shape& fill_a, const Shape& fill_b,
                                     const Shape& body, double shell_mm, double pixel_mm, const JointParams& params);
 

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Columns that hold up the crystal (paper Sec. 6.2). Private to the joints.
+#pragma once
+
+#include <vector>
+
+#include "fibrolite/frame.h"
+#include "fibrolite/ops/joint.h"
+#include "fibrolite/random.h"
+
+namespace fibrolite {
+
+struct SupportColumns {
+  std::vector<Capsule> columns;
+  int dropped = 0;
+  double contact_area_mm2 = 0;  ///< Crystal in the layer's face, and the columns' feet.
+};
+/// Columns from `layer` along `frame`.z into `crystal`: its material within half of reach_mm is projected on the layer,
+/// feet are drawn as Poisson disks from where both are solid, each column ends where the crystal is stick_mm / 4 deep.
+/// A column that leaves `body` first or finds nothing within reach is dropped.
+[[nodiscard]] SupportColumns support_columns(const Layer& layer, const Frame& frame, const Shape& crystal,
+                                             double stick_mm, const Shape& body, const JointParams& params,
+                                             Random random, const Context& context);
+
+}  // namespace fibrolite
