@@ -1,1 +1,157 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// generate: model in, hybrid solid out.
+#include <algorithm>
+#include <memory>
+#include <string_view>
+
+#include "commands.h"
+#include "fibrolite/mesh_io.h"
+#include "fibrolite/ops/hybridize.h"
+#include "fibrolite/ops/picture.h"
+#include "fibrolite/ops/text.h"
+#include "fibrolite/solid_io.h"
+#include "fibrolite/surface.h"
+#include "fibrolite/winding.h"
+#include "options.h"
+#include "outputs.h"
+#include "run.h"
+#include "summary.h"
+#include "terminal.h"
+
+namespace fibrolite::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct GenerateOptions {
+  ModelOptions model;
+  RecipeOptions recipe;
+  RunOptions run;
+  OutputOptions output;
+  std::optional<double> voxel_mm;
+  InfillKind infill = InfillKind::Hybrid;
+  std::optional<fs::path> picture, steps;
+
+  [[nodiscard]] std::vector<fs::path> targets() const {
+    std::vector<fs::path> all = output.files;
+    for (const auto& extra : {picture, steps})
+      if (extra) all.push_back(*extra);
+    all.push_back(output.report_path());
+    return all;
+  }
+};
+
+std::string_view name_of(InfillKind kind) {
+  return std::find_if(infill_names.begin(), infill_names.end(), [&](const InfillName& n) { return n.kind == kind; })
+      ->name;
+}
+
+bool is_vdb(const fs::path& file) { return file.extension() == ".vdb" || file.extension() == ".VDB"; }
+
+std::string plan(const GenerateOptions& options, const Model& model, const HybridizeParams& params) {
+  const Vec3d size = bounds(model.mesh).size();
+  std::string text = "model     " + options.model.path.string() + ", " + std::to_string(model.mesh.triangles.size()) +
+                     " triangles, " + number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) +
+                     " mm\n";
+  text += "infill    " + std::string(name_of(options.infill)) + "\n";
+  text += "voxel     " + number_text(*params.voxel_mm) + " mm\n";
+  text += "memory    at most " +
+          memory_text(predict_memory(model.mesh, *params.voxel_mm, params.recipe, params.infill)) + " of " +
+          memory_text(options.run.allowed_bytes()) + "\n";
+  for (const fs::path& target : options.targets()) text += "output    " + target.string() + "\n";
+  return text + "dry run: nothing was written\n";
+}
+
+/// Shell, joints, then each part in its own colour.
+PointColor colors(const Hybrid& hybrid, const Shape& body, double shell_mm) {
+  std::vector<Shape> layers_and_columns;
+  for (const Joint& joint : hybrid.joints) layers_and_columns.push_back(joint.shape);
+  std::vector<Rgb> by_part;
+  for (const Part& part : hybrid.parts.parts) by_part.push_back(part_color(part.id(), part.kind() == Kind::Column));
+  return [body, joints = unite(layers_and_columns), labels = hybrid.parts.labels, by_part, shell_mm](Vec3d p) {
+    if (body(p) > -shell_mm) return shell_color;
+    if (joints(p) <= 0) return joint_color;
+    return by_part.at(static_cast<std::size_t>(labels.label(p)));
+  };
+}
+
+void generate(const GenerateOptions& options) {
+  HybridizeParams params;
+  params.recipe = options.recipe.load();
+  params.infill = options.infill;
+  params.steps = options.steps.has_value();
+  params.recipe.verify.up = direction(options.model.up);
+  check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
+  Outputs outputs(options.targets(), options.model.path, options.run.overwrite);
+
+  const ThreadLimit threads(options.run.threads);
+  const Terminal terminal(options.run);
+  const Context& context = terminal.context();
+  Report report;
+  report.command = "generate";
+  report.recipe = params.recipe;
+  report.infill = name_of(options.infill);
+  report.threads = threads.count();
+  Stopwatch stage(report.stages);
+
+  Model model = load_model(options.model, report, context.part(0, 0.05, "read"));
+  params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
+  check_recipe(params.recipe, *params.voxel_mm, options.infill);
+  check_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run);
+  if (options.run.dry_run) return print(plan(options, model, params));
+
+  // Each thing goes as soon as nothing needs it: at the end only the mesh and its check are in memory.
+  Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.75, "fill"));
+  const Shape body = options.picture ? distance_to(WindingTree(model.mesh)) : Shape();
+  model = {};
+  stage("write solid", [&] {
+    for (const fs::path& file : options.output.files)
+      if (is_vdb(file)) write_vdb(outputs.place(file), {{"solid", hybrid.solid}}, context.part(0.75, 0.78, "write"));
+    if (options.steps) write_vdb(outputs.place(*options.steps), hybrid.steps, context.part(0.78, 0.8, "write"));
+  });
+  hybrid.steps.clear();
+  const Mesh mesh = stage("surface", [&] { return surface(hybrid.solid, {}, context.part(0.8, 0.88, "surface")); });
+  if (options.picture) {
+    stage("picture", [&] {
+      PictureParams view;
+      view.up = params.recipe.verify.up;
+      write_png(outputs.place(*options.picture),
+                picture(mesh, hybrid.solid, colors(hybrid, body, params.recipe.shell.thickness_mm), view,
+                        context.part(0.88, 0.92, "picture")));
+    });
+  }
+  hybrid = {};
+  report.mesh = stage("check mesh", [&] { return check(mesh); });
+  context.check();
+  stage("write mesh", [&] {
+    for (const fs::path& file : options.output.files)
+      if (!is_vdb(file)) write_mesh(outputs.place(file), mesh, context.part(0.92, 1, "write"));
+  });
+  write_text(outputs.place(options.output.report_path()), to_json(report));
+  context.check();
+  outputs.commit();
+  context.progress(1);
+  if (!options.run.quiet) print_summary(report, options.targets());
+}
+
+}  // namespace
+
+void add_generate_command(CLI::App& program) {
+  const auto options = std::make_shared<GenerateOptions>();
+  CLI::App& command = *program.add_subcommand("generate", "Model in, hybrid solid out");
+  std::vector<std::string> endings = writable_mesh_endings();
+  endings.emplace_back(".vdb");
+  add_options(command, options->model);
+  add_options(command, options->output, endings);
+  add_infill(command, options->infill);
+  add_voxel(command, options->voxel_mm,
+            "Voxel edge (default: the smaller of longest side / 400 and the recipe's thinnest feature / 3)");
+  add_options(command, options->recipe);
+  add_file(command, "--picture", options->picture, ".png", "Picture of the solid, cut open");
+  add_file(command, "--steps", options->steps, ".vdb", "Every step as a named grid");
+  command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");
+  add_options(command, options->run);
+  command.callback([options] { generate(*options); });
+}
+
+}  // namespace fibrolite::cli

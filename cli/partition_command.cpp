@@ -1,1 +1,155 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// partition: the parts alone, coloured or as grids, before the stress analysis judges them.
+#include <limits>
+#include <memory>
+
+#include "commands.h"
+#include "fibrolite/mesh_io.h"
+#include "fibrolite/ops/partition.h"
+#include "fibrolite/ops/picture.h"
+#include "fibrolite/realize.h"
+#include "fibrolite/solid_io.h"
+#include "fibrolite/surface.h"
+#include "fibrolite/to_solid.h"
+#include "options.h"
+#include "outputs.h"
+#include "run.h"
+#include "summary.h"
+#include "terminal.h"
+
+namespace fibrolite::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PartitionOptions {
+  ModelOptions model;
+  RecipeOptions recipe;
+  RunOptions run;
+  OutputOptions output;
+  std::optional<double> voxel_mm;
+};
+
+constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
+
+PartReport part_report(const Candidate& candidate) {
+  PartReport part;
+  part.id = candidate.id;
+  part.kind = candidate.column_like ? "column" : "bulk";
+  part.volume_mm3 = candidate.volume_mm3;
+  part.lumen_mm3 = part.infill_volume_mm3 = not_measured;
+  part.centroid_mm = candidate.centroid_mm;
+  part.axis = candidate.axis.mean();
+  part.diameter_mm = candidate.diameter_mm;
+  part.stress = {not_measured, {not_measured, not_measured}, not_measured, not_measured};
+  part.reason = candidate.reason;
+  return part;
+}
+
+InterfaceReport interface_report(const Cut& cut) {
+  InterfaceReport interface;
+  interface.a = cut.a;
+  interface.b = cut.b;
+  interface.centroid_mm = cut.frame.origin;
+  interface.normal = cut.frame.z;
+  interface.area_mm2 = interface.layer_area_mm2 = interface.union_area_mm2 = interface.bridge_area_mm2 =
+      interface.contact_area_mm2 = not_measured;
+  return interface;
+}
+
+void fill_report(Report& report, const Model& model, const Partition& parts) {
+  report.model.triangles = static_cast<std::int64_t>(model.mesh.triangles.size());
+  report.model.size_mm = bounds(model.mesh).size();
+  report.model.volume_mm3 = signed_volume(model.mesh);
+  report.model.repairs = model.repairs;
+  report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
+  report.warnings.insert(report.warnings.end(), parts.notes.begin(), parts.notes.end());
+  report.threshold = parts.threshold;
+  report.stable_from = parts.stable_from;
+  report.stable_to = parts.stable_to;
+  for (const Candidate& candidate : parts.candidates) report.parts.push_back(part_report(candidate));
+  for (const Cut& cut : parts.cuts) report.interfaces.push_back(interface_report(cut));
+}
+
+Mesh colored(Mesh mesh, const Partition& parts) {
+  std::vector<Rgb> by_part;
+  for (const Candidate& candidate : parts.candidates)
+    by_part.push_back(part_color(candidate.id, candidate.column_like));
+  mesh.triangle_colors.clear();
+  for (const Mesh::Triangle& t : mesh.triangles) {
+    const auto corner = [&](int i) { return to_double(mesh.vertices[t[static_cast<std::size_t>(i)]]); };
+    const Vec3d middle = (corner(0) + corner(1) + corner(2)) / 3;
+    mesh.triangle_colors.push_back(by_part.at(static_cast<std::size_t>(parts.labels.label(middle))));
+  }
+  return mesh;
+}
+
+std::vector<NamedSolid> grids(const Solid& body, const Partition& parts, const Context& context) {
+  std::vector<NamedSolid> list;
+  for (const Candidate& candidate : parts.candidates)
+    list.push_back({"part_" + std::to_string(candidate.id),
+                    realize(intersect({distance_to(body), parts.labels.region(candidate.id)}), body, context)});
+  return list;
+}
+
+void run_partition(const PartitionOptions& options) {
+  const Recipe recipe = options.recipe.load();
+  std::vector<fs::path> targets = options.output.files;
+  targets.push_back(options.output.report_path());
+  Outputs outputs(targets, options.model.path, options.run.overwrite);
+
+  const ThreadLimit threads(options.run.threads);
+  const Terminal terminal(options.run);
+  const Context& context = terminal.context();
+  Report report;
+  report.command = "partition";
+  report.recipe = recipe;
+  report.infill = "";
+  report.threads = threads.count();
+  Stopwatch stage(report.stages);
+
+  const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
+  if (options.voxel_mm) check_memory(model.mesh, *options.voxel_mm, recipe, InfillKind::Solid, options.run);
+  const Proxy proxy = stage("proxy", [&] { return make_proxy(model.mesh, {}, context.part(0.1, 0.2, "proxy")); });
+  const DiameterField field =
+      stage("diameter", [&] { return diameter(proxy.surface, {}, context.part(0.2, 0.5, "diameter")); });
+  const Partition parts = stage(
+      "partition", [&] { return partition(proxy, field, recipe.partition, context.part(0.5, 0.8, "partition")); });
+  fill_report(report, model, parts);
+
+  // The parts are functions of space: they can be shown on a body as fine as is asked for.
+  const Solid body = !options.voxel_mm ? proxy.solid : stage("body", [&] {
+    return to_solid(model.mesh, {.grid = {.voxel_mm = *options.voxel_mm}}, context.part(0.8, 0.85, "body")).solid;
+  });
+  stage("write", [&] {
+    for (const fs::path& file : options.output.files) {
+      if (file.extension() == ".ply" || file.extension() == ".PLY") {
+        write_mesh(outputs.place(file), colored(options.voxel_mm ? surface(body, {}, context) : proxy.surface, parts),
+                   context);
+      } else {
+        write_vdb(outputs.place(file), grids(body, parts, context), context);
+      }
+    }
+  });
+  write_text(outputs.place(options.output.report_path()), to_json(report));
+  context.check();
+  outputs.commit();
+  context.progress(1);
+  if (!options.run.quiet) print_parts(report, targets);
+}
+
+}  // namespace
+
+void add_partition_command(CLI::App& program) {
+  const auto options = std::make_shared<PartitionOptions>();
+  CLI::App& command = *program.add_subcommand("partition", "Parts by shape only, coloured (.ply) or as grids (.vdb)");
+  add_options(command, options->model);
+  add_options(command, options->output, {".ply", ".vdb"});
+  add_voxel(command, options->voxel_mm,
+            "Voxel edge of what is written (default: that of the coarse grid the parts are found on)");
+  add_options(command, options->recipe);
+  add_options(command, options->run);
+  command.callback([options] { run_partition(*options); });
+}
+
+}  // namespace fibrolite::cli

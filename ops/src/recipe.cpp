@@ -6,8 +6,7 @@
 #include <limits>
 
 #include "fibrolite/error.h"
-#include "fibrolite/ops/nearest.h"
-#include "number_text.h"
+#include "fibrolite/ops/text.h"
 
 namespace fibrolite {
 namespace {

@@ -7,9 +7,8 @@
 #include <set>
 
 #include "fibrolite/error.h"
-#include "fibrolite/ops/nearest.h"
 #include "fibrolite/ops/recipe.h"
-#include "number_text.h"
+#include "fibrolite/ops/text.h"
 
 namespace fibrolite {
 namespace {

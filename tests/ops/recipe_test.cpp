@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fibrolite/error.h"
-#include "fibrolite/ops/nearest.h"
+#include "fibrolite/ops/text.h"
 
 namespace fibrolite {
 namespace {

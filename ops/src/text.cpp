@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fibrolite/ops/nearest.h"
+#include "fibrolite/ops/text.h"
 
 #include <algorithm>
+#include <charconv>
 #include <limits>
 
 namespace fibrolite {
@@ -40,6 +41,12 @@ std::string nearest_name(std::string_view wanted, const std::vector<std::string>
     }
   }
   return best;
+}
+
+std::string number_text(double value, int digits) {
+  char buffer[40];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general, digits).ptr;
+  return {buffer, end};
 }
 
 }  // namespace fibrolite

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// "Did you mean": the name closest to a misspelt one.
+// Words and numbers in messages: "did you mean", and numbers that read the same in every locale.
 #pragma once
 
 #include <string>
@@ -13,5 +13,8 @@ namespace fibrolite {
 [[nodiscard]] int edit_distance(std::string_view a, std::string_view b);
 /// The name with the smallest edit distance, the first of equals; empty if there are no names.
 [[nodiscard]] std::string nearest_name(std::string_view wanted, const std::vector<std::string>& names);
+
+/// Up to `digits` significant digits, 1 to 17: 0.8, 1.25e-07, nan.
+[[nodiscard]] std::string number_text(double value, int digits = 6);
 
 }  // namespace fibrolite

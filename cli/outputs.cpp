@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "outputs.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <string>
+#include <system_error>
+
+#include "exit_codes.h"
+#include "fibrolite/error.h"
+#include "fibrolite/file.h"
+
+namespace fibrolite::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What a signal handler may read: names that do not change while they are listed here.
+std::atomic<const std::vector<std::string>*> hidden_names{nullptr};
+std::atomic<bool> in_commit{false};
+
+/// The file itself where `target` is a link to one, so that the link stays.
+fs::path followed(const fs::path& target) {
+  std::error_code error;
+  if (!fs::is_symlink(target, error)) return target;
+  const fs::path real = fs::weakly_canonical(target, error);
+  return error ? target : real;
+}
+
+/// Keeps the ending, which says the format.
+fs::path hidden_name(const fs::path& target) {
+  std::string name = ".";
+  name += target.stem().string() + "." + std::to_string(getpid()) + ".new" + target.extension().string();
+  return target.parent_path() / name;
+}
+
+}  // namespace
+
+Outputs::Outputs(const std::vector<fs::path>& targets, const fs::path& model, bool overwrite) {
+  auto names = std::make_unique<std::vector<std::string>>();
+  for (const fs::path& asked : targets) {
+    const fs::path target = followed(asked);
+    std::error_code error;
+    const bool exists = fs::exists(target, error);
+    if (exists && fs::equivalent(target, model, error))
+      throw UsageError("an output would replace the model", asked.string(), "choose another name");
+    for (const Item& other : items_)
+      if (fs::weakly_canonical(other.target, error) == fs::weakly_canonical(target, error))
+        throw UsageError("two outputs have the same name", asked.string(), "choose another name for one");
+    if (exists && !overwrite)
+      throw Error(Code::Io, "the output exists", asked.string(), "use --overwrite to replace it");
+    static_cast<void>(OutputFile(target));  // throws if the folder is missing or nothing can be written there
+    items_.push_back({asked, target, hidden_name(target), exists});
+    names->push_back(fs::absolute(items_.back().hidden, error).string());
+  }
+  hidden_names = names.release();
+}
+
+Outputs::~Outputs() {
+  discard();
+  delete hidden_names.exchange(nullptr);
+}
+
+const fs::path& Outputs::place(const fs::path& target) const {
+  for (const Item& item : items_)
+    if (item.asked == target) return item.hidden;
+  throw Error(Code::Internal, "an output that was not planned", target.string());
+}
+
+void Outputs::commit() {
+  in_commit = true;
+  std::error_code error;
+  for (std::size_t i = 0; i < items_.size() && !error; ++i) {
+    fs::rename(items_[i].hidden, items_[i].target, error);
+    if (!error) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      std::error_code ignored;
+      if (!items_[j].existed) fs::remove(items_[j].target, ignored);
+    }
+    in_commit = false;
+    throw Error(Code::Io, "the output cannot be put in place: " + error.message(), items_[i].asked.string());
+  }
+  in_commit = false;
+}
+
+void Outputs::discard() noexcept {
+  if (const auto* names = hidden_names.load())
+    for (const std::string& name : *names) ::unlink(name.c_str());
+}
+
+bool Outputs::committing() noexcept { return in_commit; }
+
+}  // namespace fibrolite::cli

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The files a command writes: all of them, or none.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace fibrolite::cli {
+
+/// Every output is checked before any work, written under a hidden name beside its target, and moved there by commit()
+/// together with the others. What was not committed is removed. One at a time.
+class Outputs {
+ public:
+  /// @throws UsageError: the same file twice, or the model itself; Error Io: folder missing or not writable, file
+  /// exists without `overwrite`.
+  Outputs(const std::vector<std::filesystem::path>& targets, const std::filesystem::path& model, bool overwrite);
+  ~Outputs();
+  Outputs(const Outputs&) = delete;
+  Outputs& operator=(const Outputs&) = delete;
+
+  /// Where to write what shall become `target`, which must be one of the constructor's.
+  [[nodiscard]] const std::filesystem::path& place(const std::filesystem::path& target) const;
+  /// @throws Error Io; then none of the outputs is there.
+  void commit();
+
+  /// For a signal handler: remove what is written so far.
+  static void discard() noexcept;
+  [[nodiscard]] static bool committing() noexcept;
+
+ private:
+  struct Item {
+    std::filesystem::path asked, target, hidden;
+    bool existed = false;
+  };
+  std::vector<Item> items_;
+};
+
+}  // namespace fibrolite::cli

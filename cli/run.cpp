@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "run.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fibrolite/error.h"
+#include "fibrolite/file.h"
+#include "fibrolite/mesh_io.h"
+#include "fibrolite/ops/text.h"
+#include "fibrolite/solid_io.h"
+#include "fibrolite/surface.h"
+
+namespace fibrolite::cli {
+namespace {
+
+MeshFile read_model(const std::filesystem::path& path, const Context& context) {
+  const std::string ending = path.extension().string();
+  if (ending == ".vdb" || ending == ".VDB") {
+    MeshFile file;
+    file.mesh = surface(read_vdb(path), {}, context);
+    return file;
+  }
+  return read_mesh(path, context);
+}
+
+/// To two significant digits.
+double round_up(double value) {
+  const double step = std::pow(10.0, std::floor(std::log10(value)) - 1);
+  return std::ceil(value / step) * step;
+}
+
+}  // namespace
+
+Model load_model(const ModelOptions& options, Report& report, const Context& context) {
+  Stopwatch stage(report.stages);
+  const MeshFile file = stage("read", [&] { return read_model(options.path, context.part(0, 0.5, "read")); });
+  Model model = stage("prepare", [&] { return prepare(file, options.prepare, context.part(0.5, 1, "prepare")); });
+  report.model.path = options.path.string();
+  report.warnings.insert(report.warnings.end(), file.notes.begin(), file.notes.end());
+  return model;
+}
+
+void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run) {
+  const auto needed = [&](double voxel) { return predict_memory(model, voxel, recipe, infill); };
+  const double allowed = run.allowed_bytes();
+  if (needed(voxel_mm) <= allowed) return;
+  const std::string what =
+      "the run would need about " + memory_text(needed(voxel_mm)) + " of memory, more than " + memory_text(allowed);
+  const std::string where = "voxel " + number_text(voxel_mm) + " mm";
+  const double coarsest = bounds(model).longest_side();
+  double fitting = voxel_mm;
+  while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting *= 2;
+  fitting = std::max(voxel_mm, fitting / 2);
+  while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting = round_up(fitting * 1.05);
+  throw Error(Code::TooLarge, what, where,
+              fitting < coarsest ? "use --voxel " + number_text(fitting) + " or larger, or raise --max-memory"
+                                 : "raise --max-memory");
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+  OutputFile file(path);
+  file.write(text);
+  file.commit();
+}
+
+std::string memory_text(double bytes) {
+  const char* unit = "bytes";
+  for (const char* larger : {"KB", "MB", "GB", "TB"}) {
+    if (bytes < 1000) break;
+    bytes /= 1024;
+    unit = larger;
+  }
+  return number_text(bytes, 3) + " " + unit;
+}
+
+ThreadLimit::ThreadLimit(int threads) {
+  if (threads > 0) control_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+}
+int ThreadLimit::count() {
+  return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+}
+
+}  // namespace fibrolite::cli

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Steps that commands share.
+#pragma once
+
+#include <tbb/global_control.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "fibrolite/context.h"
+#include "fibrolite/ops/hybridize.h"
+#include "fibrolite/ops/prepare.h"
+#include "fibrolite/ops/report.h"
+#include "options.h"
+
+namespace fibrolite::cli {
+
+/// Read and prepare MODEL as stages of the report. A .vdb is taken as the surface of its level set.
+[[nodiscard]] Model load_model(const ModelOptions& options, Report& report, const Context& context);
+
+/// @throws Error TooLarge, before anything is allocated, if the run would need more than it may use.
+void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run);
+
+/// Whole or absent. @throws Error Io.
+void write_text(const std::filesystem::path& path, const std::string& text);
+
+/// "1.5 GB", steps of 1024.
+[[nodiscard]] std::string memory_text(double bytes);
+
+/// Keeps TBB to --threads while it lives.
+class ThreadLimit {
+ public:
+  explicit ThreadLimit(int threads);  ///< 0: no limit.
+  /// How many may run.
+  [[nodiscard]] static int count();
+
+ private:
+  std::optional<tbb::global_control> control_;
+};
+
+}  // namespace fibrolite::cli

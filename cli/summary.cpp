@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "summary.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fibrolite/error.h"
+#include "fibrolite/ops/text.h"
+#include "terminal.h"
+
+namespace fibrolite::cli {
+namespace {
+
+using Row = std::vector<std::string>;
+
+/// Columns as wide as their widest cell; the last one is not padded.
+std::string table(const std::vector<Row>& rows) {
+  std::vector<std::size_t> width(rows.front().size(), 0);
+  for (const Row& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], row[i].size());
+  std::string text;
+  for (const Row& row : rows) {
+    for (std::size_t i = 0; i + 1 < row.size(); ++i) text += row[i] + std::string(width[i] - row[i].size() + 2, ' ');
+    text += row.back() + "\n";
+  }
+  return text;
+}
+
+std::string measured(double value, int digits = 4) { return std::isfinite(value) ? number_text(value, digits) : "-"; }
+
+std::string share(double part, double whole) {
+  return whole > 0 && std::isfinite(part) ? number_text(100 * part / whole, 3) + " %" : "-";
+}
+
+std::string joints_line(const std::vector<InterfaceReport>& interfaces) {
+  if (interfaces.empty()) return {};
+  int columns = 0, dropped = 0;
+  for (const InterfaceReport& interface : interfaces) {
+    columns += interface.columns;
+    dropped += interface.columns_dropped;
+  }
+  return "joints    " + std::to_string(interfaces.size()) + ", with " + std::to_string(columns) + " support columns (" +
+         std::to_string(dropped) + " found no crystal)\n";
+}
+
+std::string parts_table(const std::vector<PartReport>& parts) {
+  if (parts.empty()) return {};
+  std::vector<Row> rows{{"part", "kind", "infill", "volume mm3", "filled", "fibres", "diameter mm", "reason"}};
+  for (const PartReport& part : parts)
+    rows.push_back({std::to_string(part.id), part.kind, part.infill.empty() ? "-" : part.infill,
+                    measured(part.volume_mm3), share(part.infill_volume_mm3, part.lumen_mm3),
+                    part.fibres > 0 ? std::to_string(part.fibres) : "-", measured(part.diameter_mm, 3), part.reason});
+  return table(rows) + "\n";
+}
+
+/// Warnings and files, and out with it. The outputs are what was asked for, and they are in place: a failing stdout is
+/// let be.
+void finish(std::string text, const Report& report, const std::vector<std::filesystem::path>& files) {
+  for (const std::string& warning : report.warnings) text += "warning   " + warning + "\n";
+  for (const std::filesystem::path& file : files) text += "wrote     " + file.string() + "\n";
+  try {
+    print(text);
+  } catch (const Error&) {
+  }
+}
+
+}  // namespace
+
+void print_parts(const Report& report, const std::vector<std::filesystem::path>& files) {
+  const std::string threshold = "threshold " + measured(report.threshold) + "\n";
+  finish(parts_table(report.parts) + threshold, report, files);
+}
+
+void print_summary(const Report& report, const std::vector<std::filesystem::path>& files) {
+  std::string text = parts_table(report.parts) + joints_line(report.interfaces);
+  const SolidReport& solid = report.solid;
+  text += "solid     " + measured(solid.mass_g) + " g, " + measured(solid.volume_mm3, 6) + " mm3, " +
+          measured(100 * solid.fill_ratio, 3) + " % of the full model, " + std::to_string(solid.pieces) +
+          (solid.pieces == 1 ? " piece, " : " pieces, ") + std::to_string(solid.cavities) + " closed cavities\n";
+  text += "mesh      " + std::to_string(report.mesh.triangles) + " triangles, " +
+          (report.mesh.closed() ? "closed" : std::to_string(report.mesh.boundary_edges) + " open edges") + "; voxel " +
+          measured(solid.voxel_mm) + " mm\n";
+  double wall_s = 0, cpu_s = 0, peak_mb = 0;
+  for (const StageReport& stage : report.stages) {
+    wall_s += stage.wall_s;
+    cpu_s += stage.cpu_s;
+    peak_mb = std::max(peak_mb, stage.peak_rss_mb);
+  }
+  text += "run       " + measured(wall_s, 3) + " s (" + measured(cpu_s, 3) + " s of CPU), " + measured(peak_mb, 3) +
+          " MB of memory\n";
+  finish(text, report, files);
+}
+
+}  // namespace fibrolite::cli

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a run made, for a reader.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "fibrolite/ops/report.h"
+
+namespace fibrolite::cli {
+
+/// Parts and files of a partition.
+void print_parts(const Report& report, const std::vector<std::filesystem::path>& files);
+/// Parts, solid, mesh, time, memory and files of a run whose outputs are in place; a failing standard output is let be.
+void print_summary(const Report& report, const std::vector<std::filesystem::path>& files);
+
+}  // namespace fibrolite::cli
