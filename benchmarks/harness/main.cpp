@@ -93,7 +93,8 @@ int bench(const Options& options) {
     json["cases"].push_back(to_json(c, run));
     std::ofstream(options.out / "bench.json") << json.dump(2) << '\n';
   }
-  std::cout << "compute: stages without reading and writing files; x floor: compute over the floor's; process: whole "
+  std::cout << "compute: stages without reading, preparing and writing files; x floor: compute over the floor's; "
+               "process: whole "
                "processes.\n"
             << "written: " << (options.out / "bench.json").string() << '\n';
   return failed == 0 ? 0 : 1;

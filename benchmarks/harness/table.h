@@ -19,8 +19,8 @@ struct Stage {
 struct Run {
   ChildResult program, floor;
   std::vector<Stage> stages;
-  double compute_s = 0, compute_cpu_s = 0;  ///< Stages that neither read nor write files.
-  double files_s = 0;                       ///< The others.
+  double compute_s = 0, compute_cpu_s = 0;  ///< All stages but those of files_s.
+  double files_s = 0;                       ///< Reading, preparing, writing.
   double partition_s = 0;                   ///< Stages that decide the parts.
   double active_voxels = 0, triangles = 0;
   double floor_compute_s = 0, floor_compute_cpu_s = 0;

@@ -62,7 +62,7 @@ void per_point(benchmark::State& state, const Shape& shape) {
 Shape membranes() {
   const Shape rod = cylinder({0, 0, -30}, {0, 0, 30}, 10);
   const Solid solid = realize(rod, Box3d{{-12, -12, -32}, {12, 12, 32}}, Grid{.voxel_mm = 0.5});
-  const Parts parts = whole_body(make_proxy(surface(solid)), Kind::Column);
+  const Parts parts = whole_body(surface(solid), Kind::Column);
   return generate(parts.parts.front(), MfsParams{}, rod, 1.0).shape;
 }
 
