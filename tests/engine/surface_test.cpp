@@ -1,1 +1,90 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/surface.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "fibrolite/random.h"
+#include "fibrolite/realize.h"
+#include "mesh_checks.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr Box3d box{{-12, -12, -12}, {12, 12, 12}};
+
+/// Values that cross zero anywhere, in any configuration of a cell.
+struct Noise final : Shape::Function {
+  void evaluate(const PointBlock& block, float* out) const override {
+    for (int i = 0; i < block.count; ++i) {
+      Random random(
+          static_cast<std::uint64_t>(std::lround(block.x[i] * 8) * 1000003 + std::lround(block.y[i] * 8) * 1009 +
+                                     std::lround(block.z[i] * 8) + 5000000),
+          "noise");
+      out[i] = static_cast<float>(0.8 * (random.uniform() - 0.5));
+    }
+  }
+  [[nodiscard]] Interval bound(const Box3d&) const override { return {-0.5F, 0.5F}; }
+};
+
+TEST(Surface, keeps_the_volume_of_sticks) {
+  for (const double radius : {1.5, 2.0, 3.0, 6.0}) {
+    const double most = radius < 2 ? 0.045 : 0.015;  // three voxels thick: the vertices are too few for better
+    for (const Vec3d to : {Vec3d{20, 0, 0}, Vec3d{12, 13, 0}, Vec3d{11, 10, 12}}) {
+      const Vec3d from = Vec3d{0.13, 0.37, 0.21} - 0.5 * to;
+      const Solid solid =
+          realize(capsule(from, from + to, radius), Box3d{{-20, -20, -20}, {20, 20, 20}}, {.voxel_mm = 1});
+      EXPECT_NEAR(signed_volume(surface(solid)) / solid.volume_mm3(), 1, most) << radius;
+    }
+  }
+}
+
+TEST(Surface, of_a_sphere_lies_on_the_sphere_and_faces_outward) {
+  const Mesh mesh = surface(realize(sphere({0, 0, 0}, 8), box, {.voxel_mm = 0.25}));
+  EXPECT_NEAR(signed_volume(mesh) / (4.0 / 3 * std::numbers::pi * 512), 1, 0.001);
+  for (const Vec3f v : mesh.vertices) ASSERT_NEAR(norm(to_double(v)), 8, 0.02);
+  EXPECT_TRUE(testing::count(mesh).sound());
+}
+
+TEST(Surface, flat_faces_stay_flat_and_edges_stay_within_half_a_voxel) {
+  const Mesh mesh = surface(realize(cuboid({{-5.1, -5.1, -5.1}, {5.1, 5.1, 5.1}}), box, {.voxel_mm = 0.5}));
+  const Shape truth = cuboid({{-5.1, -5.1, -5.1}, {5.1, 5.1, 5.1}});
+  for (const Vec3f v : mesh.vertices) ASSERT_LT(std::abs(truth(to_double(v))), 0.25);
+  EXPECT_NEAR(signed_volume(mesh) / (10.2 * 10.2 * 10.2), 1, 0.003);
+}
+
+TEST(Surface, of_noise_is_closed_and_manifold) {
+  const Shape noise(std::make_shared<const Noise>());
+  const Mesh mesh = surface(realize(intersect({noise, sphere({0, 0, 0}, 5)}), box, {.voxel_mm = 0.125}));
+  ASSERT_GT(mesh.triangles.size(), 100000U);
+  const auto count = testing::count(mesh);
+  EXPECT_EQ(count.boundary_edges, 0);
+  EXPECT_EQ(count.nonmanifold_edges, 0);
+  EXPECT_EQ(count.nonmanifold_vertices, 0);
+  EXPECT_EQ(count.degenerate_triangles, 0);
+}
+
+TEST(Surface, of_touching_planes_on_the_lattice_has_no_degenerate_triangle) {
+  const Shape shape =
+      unite({cuboid({{-5, -5, -5}, {0, 5, 5}}), cuboid({{0, -3, -3}, {5, 3, 3}}), cuboid({{5, 3, 3}, {8, 6, 6}})});
+  const auto count = testing::count(surface(realize(shape, box, {.voxel_mm = 0.5})));
+  EXPECT_TRUE(count.sound()) << count.degenerate_triangles << ' ' << count.nonmanifold_edges << ' '
+                             << count.nonmanifold_vertices;
+}
+
+TEST(Surface, same_bits_on_one_and_two_threads) {
+  const Solid solid = realize(torus({}, 7, 2), box, {.voxel_mm = 0.2});
+  Mesh meshes[2];
+  for (int threads = 1; threads <= 2; ++threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    meshes[threads - 1] = surface(solid);
+  }
+  EXPECT_TRUE(meshes[0].vertices == meshes[1].vertices);
+  EXPECT_TRUE(meshes[0].triangles == meshes[1].triangles);
+}
+
+}  // namespace
+}  // namespace fibrolite

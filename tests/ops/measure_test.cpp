@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/measure.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <numbers>
+
+#include "fibrolite/realize.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr Box3d box{{-12, -12, -12}, {12, 12, 12}};
+constexpr double ball = 4.0 / 3 * std::numbers::pi;
+
+TEST(Measure, parts_share_a_sphere) {
+  const Solid body = realize(sphere({0, 0, 0}, 10), box, {.voxel_mm = 0.25, .band_vox = 8});
+  const Shape low = half_space({0, 0, 0.03}, {0, 0, 1});
+  const Solid solid = realize(subtract(sphere({0, 0, 0}, 10), sphere({0, 0, 0}, 6)), body);
+  const auto parts = measure(body, solid, {low, complement(low)}, 1);
+  ASSERT_EQ(parts.size(), 2U);
+  for (const PartVolumes& p : parts) {
+    EXPECT_NEAR(p.part_mm3 / (0.5 * ball * 1000), 1, 0.01);
+    EXPECT_NEAR(p.lumen_mm3 / (0.5 * ball * 729), 1, 0.01);
+    EXPECT_NEAR(p.infill_mm3 / (0.5 * ball * (729 - 216)), 1, 0.02);
+  }
+  EXPECT_NEAR(parts[0].centroid_mm.z, -3.0 / 8 * 10, 0.05);
+  EXPECT_NEAR(parts[1].centroid_mm.z, 3.0 / 8 * 10, 0.05);
+}
+
+TEST(Measure, same_bits_on_one_and_two_threads) {
+  const Solid body = realize(sphere({0, 0, 0}, 10), box, {.voxel_mm = 0.3, .band_vox = 6});
+  double part[2], moment[2];
+  for (int threads = 1; threads <= 2; ++threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    const auto parts = measure(body, body, {half_space({1, 2, 3}, {1, 1, 1}), half_space({1, 2, 3}, {-1, -1, -1})}, 1);
+    part[threads - 1] = parts[0].infill_mm3;
+    moment[threads - 1] = parts[1].centroid_mm.x;
+  }
+  EXPECT_EQ(part[0], part[1]);
+  EXPECT_EQ(moment[0], moment[1]);
+}
+
+}  // namespace
+}  // namespace fibrolite
