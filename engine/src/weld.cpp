@@ -98,6 +98,26 @@ Weld weld(const std::vector<Vec3f>& vertices) {
   return result;
 }
 
+Mesh welded(const Mesh& mesh) {
+  const Weld weld_of = weld(mesh.vertices);
+  std::vector<std::uint32_t> number(weld_of.count, none);
+  for (const auto& t : mesh.triangles)
+    for (const std::uint32_t v : t) number[weld_of.id[v]] = 0;
+  std::uint32_t used = 0;
+  for (std::uint32_t& n : number)
+    if (n != none) n = used++;
+  Mesh result;
+  result.vertices.resize(used);
+  // Backwards, so that the first vertex of a place is the one that stays.
+  for (std::size_t v = mesh.vertices.size(); v-- > 0;)
+    if (const std::uint32_t n = number[weld_of.id[v]]; n != none) result.vertices[n] = mesh.vertices[v];
+  result.triangles.reserve(mesh.triangles.size());
+  for (const auto& [a, b, c] : mesh.triangles)
+    result.triangles.push_back({number[weld_of.id[a]], number[weld_of.id[b]], number[weld_of.id[c]]});
+  result.triangle_colors = mesh.triangle_colors;
+  return result;
+}
+
 bool zero_area(Vec3f fa, Vec3f fb, Vec3f fc) {
   const Vec3d a = to_double(fa), u = to_double(fb) - a, v = to_double(fc) - a;
   const auto equal_products = [](double p, double q, double r, double s) {

@@ -19,10 +19,4 @@ struct Weld {
 /// Cost: O(n), parallel, about 12 bytes per vertex at its peak.
 Weld weld(const std::vector<Vec3f>& vertices);
 
-/// Is the area exactly zero? The differences of float coordinates are exact in
-/// double (unless the coordinates of one axis differ by more than 2^29 in
-/// magnitude), and their products are compared together with their rounding
-/// errors, so nothing is rounded.
-bool zero_area(Vec3f a, Vec3f b, Vec3f c);
-
 }  // namespace fibrolite
