@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The load of the component verification: a force from above, spread over the surface that is seen first.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "fibrolite/box.h"
+#include "fibrolite/context.h"
+#include "fibrolite/frame.h"
+#include "fibrolite/tet_mesh.h"
+
+namespace fibrolite {
+
+/// Heights along `up` that the support and the load keep to.
+struct Support {
+  double limit_mm = 0;  ///< dot(p, up) up to this is fixed and takes no load.
+  [[nodiscard]] static Support of(const TetMesh& body, Vec3d up, double share);
+};
+
+/// The places where a load from above acts, one per pixel of a horizontal raster; each carries the same share of the
+/// force, so the force is spread by projected area.
+struct Footprint {
+  Frame frame;  ///< z is up; pixel (x, y) lies at (x + 1/2, y + 1/2) * pixel_mm.
+  double pixel_mm = 1;
+  int width = 0, height = 0;
+  struct Point {
+    int pixel = 0;      ///< y * width + x
+    double height = 0;  ///< Along up from the frame's origin, mm.
+  };
+  std::vector<Point> points;  ///< Ascending by pixel.
+  [[nodiscard]] Vec3d at(const Point& point) const;
+};
+/// What is seen first from above, without what lies at or under the support's limit, or outside `region` if one is
+/// given. Cost: O(faces + pixels), about 400 pixels along the longer side.
+[[nodiscard]] Footprint seen_from_above(const TetMesh& body, Vec3d up, const Support& support,
+                                        const std::optional<Box3d>& region);
+
+/// The share of the whole force on each node of `mesh` (of the body or of one component of it), from the points that
+/// `mine` accepts. Shares sum to (points accepted) / (all points), also if the mesh misses some of them; all zero if it
+/// misses all.
+[[nodiscard]] std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint,
+                                               const std::function<bool(Vec3d)>& mine);
+
+/// Unit directions of the two load cases: straight down, and 45 degrees from it, coming from `azimuth_deg` about `up`.
+/// Azimuth 0 is the next world axis after the one nearest to `up` (x for z, y for x, z for y), made level.
+[[nodiscard]] std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg);
+
+}  // namespace fibrolite
