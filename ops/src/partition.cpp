@@ -1,1 +1,315 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/partition.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "decompose.h"
+#include "fibrolite/error.h"
+#include "fibrolite/ops/text.h"
+#include "label_samples.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr double sweep_from = 0.15;
+constexpr double sweep_step = 0.025;
+constexpr int sweep_count = 19;         // up to 0.60
+constexpr double same_overlap = 0.75;   // of a limb at one threshold with itself at the next
+constexpr double even_diameters = 1.5;  // 90th over 10th percentile: below this a threshold only sorts noise
+
+void check_params(const PartitionParams& p) {
+  const auto out_of = [](double v, double lo, double hi) { return !(v >= lo && v <= hi); };
+  if (p.threshold && out_of(*p.threshold, 0, 1)) {
+    throw Error(Code::BadRecipe, "the threshold must be 0 to 1", "partition.threshold", "leave it out for auto");
+  }
+  if (out_of(p.min_area, 0, 0.5)) {
+    throw Error(Code::BadRecipe, "the smallest area must be 0 to 0.5 of the surface", "partition.min_area",
+                "try 0.012");
+  }
+  if (out_of(p.min_slenderness, 0, 100)) {
+    throw Error(Code::BadRecipe, "the least slenderness must be 0 to 100", "partition.min_slenderness", "try 1");
+  }
+}
+
+// 90th over 10th percentile of the diameters, by area.
+double diameter_ratio(const Anatomy& anatomy) {
+  std::vector<std::size_t> order(anatomy.graph.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const std::vector<double>& d = anatomy.field->diameter_mm;
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return d[a] != d[b] ? d[a] < d[b] : a < b; });
+  const auto percentile = [&](double share) {
+    double sum = 0;
+    for (const std::size_t f : order) {
+      sum += anatomy.graph.area_mm2[f];
+      if (sum >= share * anatomy.graph.total_area_mm2) return d[f];
+    }
+    return d[order.back()];
+  };
+  const double low = percentile(0.1);
+  return low > 0 ? percentile(0.9) / low : std::numeric_limits<double>::infinity();
+}
+
+// Do two partitions have the same limbs? One to one, each with most of its samples in common.
+bool same_limbs(const Limbs& a, const Limbs& b) {
+  if (a.count != b.count) return false;
+  std::map<std::pair<int, int>, double> common;
+  std::map<int, double> size_a;
+  std::map<int, double> size_b;
+  for (std::size_t s = 0; s < a.pieces.of.size(); ++s) {
+    const int pa = a.pieces.of[s];
+    const int pb = b.pieces.of[s];
+    const bool in_a = a.limb[static_cast<std::size_t>(pa)] != 0;
+    const bool in_b = b.limb[static_cast<std::size_t>(pb)] != 0;
+    if (in_a) ++size_a[pa];
+    if (in_b) ++size_b[pb];
+    if (in_a && in_b) ++common[{pa, pb}];
+  }
+  int matched = 0;
+  for (const auto& [pair, both] : common)
+    if (both >= same_overlap * (size_a[pair.first] + size_b[pair.second] - both)) ++matched;
+  return matched == a.count;
+}
+
+struct Choice {
+  Limbs limbs;
+  double threshold = 0, stable_from = 0, stable_to = 0;
+  bool found = false;
+};
+
+// The partition that stays the same over the widest range of thresholds; of its range the middle.
+Choice most_stable(const Anatomy& anatomy, const PartitionParams& params, const Context& context) {
+  std::vector<Limbs> sweep(sweep_count);
+  tbb::parallel_for(0, sweep_count, [&](int i) {
+    context.check();
+    sweep[static_cast<std::size_t>(i)] =
+        find_limbs(anatomy, sweep_from + i * sweep_step, params.min_area, params.min_slenderness);
+  });
+  std::size_t best_first = 0;
+  std::size_t best_last = 0;
+  bool found = false;
+  for (std::size_t first = 0; first < sweep.size();) {
+    std::size_t last = first;
+    while (last + 1 < sweep.size() && same_limbs(sweep[last], sweep[last + 1])) ++last;
+    // Of two ranges of the same width the one with the higher thresholds has the larger limbs.
+    if (sweep[first].count > 0 && (!found || last - first >= best_last - best_first)) {
+      found = true;
+      best_first = first;
+      best_last = last;
+    }
+    first = last + 1;
+  }
+  Choice choice;
+  if (!found) return choice;
+  const std::size_t middle = (best_first + best_last + 1) / 2;
+  choice.limbs = std::move(sweep[middle]);
+  choice.threshold = sweep_from + sweep_step * static_cast<double>(middle);
+  choice.stable_from = sweep_from + sweep_step * static_cast<double>(best_first);
+  choice.stable_to = sweep_from + sweep_step * static_cast<double>(best_last);
+  choice.found = true;
+  return choice;
+}
+
+Choice whole_body(const Anatomy& anatomy) {
+  Choice choice;
+  choice.limbs.pieces = cut_body(anatomy, {});
+  choice.limbs.limb.assign(static_cast<std::size_t>(choice.limbs.pieces.count), 0);
+  return choice;
+}
+
+// Per inside sample: does it lie in a piece that may be a limb? Pieces without any cut (a whole body) may be one too.
+std::vector<std::uint8_t> limb_samples(const Limbs& limbs) {
+  std::vector<std::uint8_t> may = limbs.limb;
+  std::vector<std::uint8_t> is_cut(may.size(), 0);
+  for (const auto& side : limbs.pieces.sides)
+    for (const int id : side) is_cut[static_cast<std::size_t>(id)] = 1;
+  std::vector<std::uint8_t> samples(limbs.pieces.of.size());
+  for (std::size_t s = 0; s < samples.size(); ++s) {
+    const auto id = static_cast<std::size_t>(limbs.pieces.of[s]);
+    samples[s] = may[id] != 0 || is_cut[id] == 0 ? 1 : 0;
+  }
+  return samples;
+}
+
+std::vector<std::uint8_t> limb_pieces(const CutPieces& pieces, const std::vector<std::uint8_t>& samples) {
+  std::vector<std::size_t> votes(static_cast<std::size_t>(pieces.count), 0);
+  std::vector<std::size_t> size(votes.size(), 0);
+  for (std::size_t s = 0; s < samples.size(); ++s) {
+    const auto id = static_cast<std::size_t>(pieces.of[s]);
+    ++size[id];
+    votes[id] += samples[s];
+  }
+  std::vector<std::uint8_t> limb(votes.size());
+  for (std::size_t i = 0; i < limb.size(); ++i) limb[i] = 2 * votes[i] > size[i] ? 1 : 0;
+  return limb;
+}
+
+// A branching limb is parted into its branches; a new piece too small or too stout to be a limb stays with its
+// neighbour.
+CutPieces split_branches(const Anatomy& anatomy, CutPieces pieces, const std::vector<std::uint8_t>& limb_sample,
+                         const PartitionParams& params, const Context& context) {
+  constexpr int rounds = 4;
+  for (int round = 0; round < rounds; ++round) {
+    const std::vector<std::uint8_t> limb = limb_pieces(pieces, limb_sample);
+    const std::vector<Section> before = pieces.cuts;
+    std::vector<Section> extra;
+    for (int id = 0; id < pieces.count; ++id) {
+      context.check();
+      if (limb[static_cast<std::size_t>(id)] == 0) continue;
+      std::vector<Split> cuts = branch_cuts(anatomy.body, pieces.links, pieces.piece(anatomy, id));
+      extra.insert(extra.end(), std::make_move_iterator(cuts.begin()), std::make_move_iterator(cuts.end()));
+    }
+    if (extra.empty()) return pieces;
+    const std::size_t had = before.size();
+    bool added = false;
+    for (;;) {
+      std::vector<Section> all = before;
+      all.insert(all.end(), extra.begin(), extra.end());
+      CutPieces next = cut_body(anatomy, all);
+      const std::vector<double> share = area_shares(anatomy, next);
+      // Which of the new cuts part off a piece that is too small?
+      std::vector<Section> kept;
+      for (std::size_t c = 0; c < next.cuts.size(); ++c) {
+        const bool old = std::any_of(before.begin(), before.end(), [&](const Section& b) {
+          return b.frame.origin == next.cuts[c].frame.origin && b.frame.z == next.cuts[c].frame.z;
+        });
+        if (old) continue;
+        const double smaller = std::min(share[static_cast<std::size_t>(next.sides[c][0])],
+                                        share[static_cast<std::size_t>(next.sides[c][1])]);
+        if (smaller >= params.min_area) kept.push_back(next.cuts[c]);
+      }
+      if (kept.size() == extra.size() || kept.empty()) {
+        added = !kept.empty();
+        if (added) pieces = std::move(next);
+        break;
+      }
+      extra = std::move(kept);
+    }
+    if (!added || pieces.cuts.size() == had) return pieces;
+  }
+  return pieces;
+}
+
+struct Described {
+  Candidate candidate;
+  int piece = 0;
+};
+
+double piece_volume(const Anatomy& anatomy, const CutPieces& pieces, std::vector<double>& volume) {
+  const VoxelBody& body = anatomy.body;
+  const double sample = body.voxel_mm * body.voxel_mm * body.voxel_mm;
+  volume.assign(static_cast<std::size_t>(pieces.count), 0);
+  double all = 0;
+  for (std::size_t at = 0; at < body.distance.size(); ++at) {
+    const double share = std::clamp(0.5 - static_cast<double>(body.distance[at]) / body.voxel_mm, 0.0, 1.0);
+    if (share <= 0) continue;
+    volume[static_cast<std::size_t>(pieces.of[static_cast<std::size_t>(anatomy.nearest[at])])] += share * sample;
+    all += share * sample;
+  }
+  return all;
+}
+
+Candidate describe(const Anatomy& anatomy, const CutPieces& pieces, int id, bool may_be_limb, double volume,
+                   const PartitionParams& params, const Context& context) {
+  const LimbPiece piece = pieces.piece(anatomy, id);
+  Candidate c;
+  c.volume_mm3 = volume;
+  c.diameter_mm = piece.diameter_mm;
+  for (const std::int32_t s : piece.samples) c.centroid_mm = c.centroid_mm + anatomy.body.position(s);
+  c.centroid_mm = c.centroid_mm / static_cast<double>(piece.samples.size());
+  if (may_be_limb) {
+    const LimbShape shape = limb_shape(anatomy.body, pieces.links, piece, context);
+    const double slenderness = shape.slenderness();
+    c.column_like = slenderness >= params.min_slenderness;
+    c.reason = std::string(shape.ring ? "a ring " : "a limb ") + number_text(shape.length_mm, 3) + " mm long and " +
+               number_text(shape.width_mm, 3) + " mm wide (slenderness " + number_text(slenderness, 3) +
+               (c.column_like ? ", at least " : ", below ") + number_text(params.min_slenderness, 3) + ")";
+    if (c.column_like) {
+      c.axis = shape.axis;
+      c.length_mm = shape.length_mm;
+      return c;
+    }
+  } else {
+    c.reason = "thick: median diameter " + number_text(c.diameter_mm, 3) + " mm";
+  }
+  c.axis = principal_axis(anatomy.body, piece.samples);
+  c.length_mm = c.axis.length_mm();
+  return c;
+}
+
+}  // namespace
+
+Partition partition(const Proxy& proxy, const DiameterField& field, const PartitionParams& params,
+                    const Context& context) {
+  check_params(params);
+  if (field.normalized.size() != proxy.surface.triangles.size() ||
+      field.diameter_mm.size() != field.normalized.size()) {
+    throw Error(Code::Internal, "the diameters do not belong to the proxy's surface", "partition");
+  }
+  const Anatomy anatomy = make_anatomy(proxy, field, context);
+  context.progress(0.2);
+
+  Partition result;
+  Choice choice;
+  const double ratio = diameter_ratio(anatomy);
+  if (ratio < even_diameters) {
+    choice = whole_body(anatomy);
+    result.notes.push_back("the diameters hardly differ (90th over 10th percentile " + number_text(ratio, 3) +
+                           "): the model is parted by its branches alone");
+  } else if (params.threshold) {
+    choice.limbs = find_limbs(anatomy, *params.threshold, params.min_area, params.min_slenderness);
+    choice.threshold = *params.threshold;
+  } else {
+    choice = most_stable(anatomy, params, context);
+    if (!choice.found) {
+      choice = whole_body(anatomy);
+      result.notes.push_back("no threshold from " + number_text(sweep_from) + " to " +
+                             number_text(sweep_from + sweep_step * (sweep_count - 1)) + " cuts off a limb");
+    }
+  }
+  context.progress(0.6);
+  result.threshold = choice.threshold;
+  result.stable_from = choice.stable_from;
+  result.stable_to = choice.stable_to;
+  result.notes.insert(result.notes.end(), choice.limbs.notes.begin(), choice.limbs.notes.end());
+
+  const std::vector<std::uint8_t> limb_sample = limb_samples(choice.limbs);
+  const CutPieces pieces = split_branches(anatomy, std::move(choice.limbs.pieces), limb_sample, params, context);
+  const std::vector<std::uint8_t> may_be_limb = limb_pieces(pieces, limb_sample);
+  std::vector<double> volume;
+  piece_volume(anatomy, pieces, volume);
+  context.progress(0.7);
+
+  std::vector<Described> described(static_cast<std::size_t>(pieces.count));
+  tbb::parallel_for(0, pieces.count, [&](int id) {
+    const auto i = static_cast<std::size_t>(id);
+    described[i] = {describe(anatomy, pieces, id, may_be_limb[i] != 0, volume[i], params, context), id};
+  });
+  // Largest first: an order that turns with the model.
+  std::sort(described.begin(), described.end(), [](const Described& a, const Described& b) {
+    return a.candidate.volume_mm3 != b.candidate.volume_mm3 ? a.candidate.volume_mm3 > b.candidate.volume_mm3
+                                                            : a.piece < b.piece;
+  });
+  std::vector<int> name(described.size());
+  for (std::size_t i = 0; i < described.size(); ++i) {
+    described[i].candidate.id = static_cast<int>(i);
+    name[static_cast<std::size_t>(described[i].piece)] = static_cast<int>(i);
+    result.candidates.push_back(std::move(described[i].candidate));
+  }
+  for (std::size_t c = 0; c < pieces.cuts.size(); ++c) {
+    const auto& side = pieces.sides[c];
+    result.cuts.push_back({name[static_cast<std::size_t>(side[0])], name[static_cast<std::size_t>(side[1])],
+                           pieces.cuts[c].frame, pieces.cuts[c].radius_mm});
+  }
+  context.progress(0.9);
+  if (pieces.count > 1) result.labels = make_labels(make_label_samples(anatomy, pieces, name));
+  context.progress(1);
+  return result;
+}
+
+}  // namespace fibrolite

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The body in pieces: sections cut its links, what stays connected is a piece.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limb.h"
+#include "segment.h"
+
+namespace fibrolite {
+
+/// What every step of the partition reads.
+struct Anatomy {
+  const Mesh* surface = nullptr;
+  const DiameterField* field = nullptr;
+  FaceGraph graph;
+  VoxelBody body;
+  std::vector<std::int32_t> nearest;         ///< Per lattice sample: nearest inside sample.
+  std::vector<std::int32_t> face_of_sample;  ///< Per inside sample: nearest face.
+  std::vector<std::int32_t> sample_of_face;
+  Vec3d centre{};  ///< Of the body.
+};
+[[nodiscard]] Anatomy make_anatomy(const Proxy& proxy, const DiameterField& field, const Context& context);
+
+struct CutPieces {
+  std::vector<Section> cuts;              ///< Those that separate.
+  std::vector<std::array<int, 2>> sides;  ///< Piece on the near and on the far side of each.
+  std::vector<Severed> severed;           ///< Samples next to each.
+  Links links;
+  std::vector<std::int32_t> of;  ///< Piece per inside sample.
+  int count = 0;
+
+  [[nodiscard]] LimbPiece piece(const Anatomy& anatomy, int id) const;
+};
+/// Cuts that do not separate are dropped, crumbs go to the piece they hang on.
+[[nodiscard]] CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts);
+
+/// Share of the surface that belongs to each piece.
+[[nodiscard]] std::vector<double> area_shares(const Anatomy& anatomy, const CutPieces& pieces);
+
+struct Limbs {
+  CutPieces pieces;
+  std::vector<std::uint8_t> limb;  ///< Per piece.
+  int count = 0;
+  std::vector<std::string> notes;
+};
+/// Thin regions at a threshold that a plane cuts off cleanly and that are longer than wide.
+[[nodiscard]] Limbs find_limbs(const Anatomy& anatomy, double threshold, double min_area, double min_slenderness);
+
+}  // namespace fibrolite

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "label_samples.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr double clamp_vox = 4;      // how far from a cut the fields are distances
+constexpr double rim_vox = 2;        // the disc of a cut is this much wider than the section
+constexpr double outside_vox = 3.5;  // how far outside of the body the plane of a cut still decides
+
+// Distance to the disc of a cut; the sign of z says on which side.
+struct DiscDistance {
+  double mm = 0;
+  bool far_side = false;
+  bool in_cylinder = false;
+};
+DiscDistance disc_distance(const Frame& frame, double radius, Vec3d p) {
+  const Vec3d q = frame.to_local(p);
+  const double beyond = std::hypot(q.x, q.y) - radius;
+  return {beyond > 0 ? std::hypot(q.z, beyond) : std::abs(q.z), q.z >= 0, beyond <= 0};
+}
+
+}  // namespace
+
+LabelSamples make_label_samples(const Anatomy& anatomy, const CutPieces& pieces, const std::vector<int>& name) {
+  const VoxelBody& body = anatomy.body;
+  const double h = body.voxel_mm;
+  LabelSamples s;
+  s.origin = body.origin;
+  s.voxel_mm = h;
+  s.size = body.size;
+  s.count = pieces.count;
+  s.clamp_mm = clamp_vox * h;
+  const auto name_of = [&](std::int32_t inside_sample) {
+    return static_cast<std::uint16_t>(
+        name[static_cast<std::size_t>(pieces.of[static_cast<std::size_t>(inside_sample)])]);
+  };
+  s.label.resize(anatomy.nearest.size());
+  for (std::size_t at = 0; at < s.label.size(); ++at) s.label[at] = name_of(anatomy.nearest[at]);
+  if (pieces.cuts.empty()) return s;
+
+  // How far outside samples are from the body, by their nearest inside sample.
+  const auto position = [&](std::size_t at) {
+    const Vec3i c = body.coordinates(static_cast<std::int32_t>(at));
+    return body.origin + h * Vec3d{static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z)};
+  };
+  std::vector<float> decided(s.label.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t k = 0; k < pieces.cuts.size(); ++k) {
+    const Section& cut = pieces.cuts[k];
+    const double radius = cut.radius_mm + rim_vox * h;
+    const auto a = static_cast<std::uint16_t>(name[static_cast<std::size_t>(pieces.sides[k][0])]);
+    const auto b = static_cast<std::uint16_t>(name[static_cast<std::size_t>(pieces.sides[k][1])]);
+    std::vector<std::int32_t> beside = pieces.severed[k].near;
+    beside.insert(beside.end(), pieces.severed[k].far.begin(), pieces.severed[k].far.end());
+    // Through the body, so that a neighbouring limb that passes the disc closely knows nothing of the cut.
+    const std::vector<float> way = geodesic(body, body.links, beside, 1.6 * s.clamp_mm + rim_vox * h);
+    for (std::size_t at = 0; at < s.label.size(); ++at) {
+      const std::int32_t inside = anatomy.nearest[at];
+      const float from_cut = way[static_cast<std::size_t>(inside)];
+      if (from_cut < 0) continue;
+      const Vec3d p = position(at);
+      const DiscDistance disc = disc_distance(cut.frame, radius, p);
+      double mm = disc.mm;
+      if (body.inside[at] < 0) {
+        if (norm(p - body.position(inside)) > outside_vox * h) continue;
+        const std::uint16_t owner = name_of(inside);
+        if (disc.in_cylinder && (owner == a || owner == b) && static_cast<float>(mm) < decided[at]) {
+          s.label[at] = disc.far_side ? b : a;
+          decided[at] = static_cast<float>(mm);
+        }
+      } else if (disc.in_cylinder && ((s.label[at] == a && disc.far_side) || (s.label[at] == b && !disc.far_side))) {
+        // A limb that bends back past the plane: what counts is how far the cut is along the body.
+        mm = std::max(mm, static_cast<double>(from_cut));
+      }
+      if (mm < s.clamp_mm) s.near.push_back({static_cast<std::int64_t>(at), a, b, static_cast<float>(mm)});
+    }
+  }
+  std::stable_sort(s.near.begin(), s.near.end(), [](const auto& x, const auto& y) { return x.sample < y.sample; });
+  return s;
+}
+
+}  // namespace fibrolite
