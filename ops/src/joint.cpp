@@ -85,7 +85,11 @@ Frame turned(const Frame& f) { return {f.origin, f.x, -f.y, -f.z}; }
 Layer turned(const Layer& layer) {
   Layer other = layer;
   for (int y = 0; y < layer.solid.height; ++y)
-    for (int x = 0; x < layer.solid.width; ++x) other.solid(x, layer.solid.height - 1 - y) = layer.solid(x, y);
+    for (int x = 0; x < layer.solid.width; ++x) {
+      const int row = layer.solid.height - 1 - y;
+      other.solid(x, row) = layer.solid(x, y);
+      other.distance_mm(x, row) = layer.distance_mm(x, y);
+    }
   other.origin_mm.y = -(layer.origin_mm.y + (layer.solid.height - 1) * layer.pixel_mm);
   return other;
 }
@@ -104,9 +108,10 @@ Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b,
   context.check();
   context.progress(0.5);
 
+  const Shape lumen = offset(body, -shell_mm);
   const auto side = [&](const Layer& layer, const Frame& frame, const Shape& crystal, std::string_view name) {
     const Random own(seed, name, static_cast<std::uint64_t>(index));
-    SupportColumns found = support_columns(layer, frame, crystal, stick_mm, body, params, own, context);
+    SupportColumns found = support_columns(layer, frame, crystal, stick_mm, lumen, params, own, context);
     joint.columns.insert(joint.columns.end(), found.columns.begin(), found.columns.end());
     joint.columns_dropped += found.dropped;
     joint.contact_area_mm2 = found.contact_area_mm2;

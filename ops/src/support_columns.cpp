@@ -48,14 +48,14 @@ std::vector<std::optional<double>> climb(const Shape& shape, const Frame& frame,
   return hit;
 }
 
-/// The layer's material as feet: every `stride`-th pixel.
+/// Where a column may stand: every `stride`-th pixel of the layer's material, not at its very edge.
 struct FootGrid {
   int stride, width, height;
   std::vector<Vec2d> foot;         // of the solid ones
   std::vector<std::size_t> place;  // their index in the coarse raster
 };
 
-FootGrid feet_of(const Layer& layer, double spacing_mm) {
+FootGrid feet_of(const Layer& layer, double spacing_mm, double depth_mm) {
   FootGrid feet{};
   feet.stride = std::max(1, static_cast<int>(spacing_mm / layer.pixel_mm));
   feet.width = (layer.solid.width + feet.stride - 1) / feet.stride;
@@ -63,7 +63,7 @@ FootGrid feet_of(const Layer& layer, double spacing_mm) {
   for (int j = 0; j < feet.height; ++j)
     for (int i = 0; i < feet.width; ++i) {
       const int x = i * feet.stride, y = j * feet.stride;
-      if (layer.solid(x, y) == 0) continue;
+      if (layer.solid(x, y) == 0 || layer.distance_mm(x, y) > -depth_mm) continue;
       feet.foot.push_back(layer.origin_mm + layer.pixel_mm * Vec2d{x + 0.0, y + 0.0});
       feet.place.push_back(static_cast<std::size_t>(j) * static_cast<std::size_t>(feet.width) +
                            static_cast<std::size_t>(i));
@@ -95,30 +95,40 @@ bool apart(Vec2d p, const std::vector<Vec2d>& others, double distance) {
 }  // namespace
 
 SupportColumns support_columns(const Layer& layer, const Frame& frame, const Shape& crystal, double stick_mm,
-                               const Shape& body, const JointParams& params, Random random, const Context& context) {
+                               const Shape& lumen, const JointParams& params, Random random, const Context& context) {
   const double face = params.layer_mm / 2, step = stick_mm / 8;
-  const FootGrid feet = feet_of(layer, stick_mm / 4);
+  const FootGrid feet = feet_of(layer, stick_mm / 4, std::min(params.column_mm, params.min_wall_mm) / 4);
   const auto rays_from = [&](const std::vector<Vec2d>& from) {
     std::vector<Ray> rays;
     for (const Vec2d foot : from) rays.push_back({foot, face});
     return rays;
   };
+  std::vector<float> depth;
+  std::vector<Vec3d> at_face;
+  for (const Vec2d foot : feet.foot) at_face.push_back(frame.to_world({foot.x, foot.y, face}));
+  evaluate_parallel(lumen, at_face, depth);
   const auto one_cell = climb(crystal, frame, rays_from(feet.foot), 0, face + params.reach_mm / 2, step, context);
   SupportColumns result;
   std::vector<char> below(feet.foot.size());
-  std::vector<Vec2d> touching;  // where the crystal stands on the layer by itself
   for (std::size_t k = 0; k < feet.foot.size(); ++k) {
-    below[k] = one_cell[k].has_value() && *one_cell[k] > face;
-    if (one_cell[k].has_value() && *one_cell[k] <= face) touching.push_back(feet.foot[k]);
+    below[k] = depth[k] < 0 && one_cell[k].has_value() && *one_cell[k] > face;
   }
-  const double foot_mm = feet.stride * layer.pixel_mm;
-  result.contact_area_mm2 = static_cast<double>(touching.size()) * foot_mm * foot_mm;
+  // Where the crystal stands on the layer by itself.
+  const PlaneGrid grid{frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height};
+  const FloatImage crystal_at_face = sample(crystal, grid, face);
+  std::vector<Vec2d> touching;
+  for (int y = 0; y < grid.height; ++y)
+    for (int x = 0; x < grid.width; ++x) {
+      if (layer.solid(x, y) == 0 || crystal_at_face(x, y) >= 0) continue;
+      result.contact_area_mm2 += grid.pixel_mm * grid.pixel_mm;
+      if (x % feet.stride == 0 && y % feet.stride == 0) touching.push_back(grid.local(x, y));
+    }
 
   std::vector<Vec2d> darts = under_crystal(feet, below, layer.pixel_mm, params.column_mm);
   for (std::size_t i = darts.size(); i > 1; --i) std::swap(darts[i - 1], darts[random.below(i)]);
   const auto top = climb(crystal, frame, rays_from(darts), -stick_mm / 4, face + params.reach_mm, step, context);
-  // The body must hold the whole column; climbing the complement finds where it would leave.
-  const auto exit = climb(complement(body), frame, rays_from(darts), 0, face + params.reach_mm, step, context);
+  // Inside the shell a column would add nothing; climbing the complement finds where one would leave the lumen.
+  const auto exit = climb(complement(lumen), frame, rays_from(darts), 0, face + params.reach_mm, step, context);
   std::vector<Vec2d> standing, failed;
   for (std::size_t k = 0; k < darts.size(); ++k) {
     // A column beside a stick that reaches the layer, or beside a place just tried in vain, would bring nothing.

@@ -17,9 +17,9 @@ struct SupportColumns {
 };
 /// Columns from `layer` along `frame`.z into `crystal`: its material within half of reach_mm is projected on the layer,
 /// feet are drawn as Poisson disks from where both are solid, each column ends where the crystal is stick_mm / 4 deep.
-/// A column that leaves `body` first or finds nothing within reach is dropped.
+/// A column that leaves the `lumen` (the body without its shell) first, or finds nothing within reach, is dropped.
 [[nodiscard]] SupportColumns support_columns(const Layer& layer, const Frame& frame, const Shape& crystal,
-                                             double stick_mm, const Shape& body, const JointParams& params,
+                                             double stick_mm, const Shape& lumen, const JointParams& params,
                                              Random random, const Context& context);
 
 }  // namespace fibrolite
