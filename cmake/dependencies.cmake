@@ -28,8 +28,8 @@ macro(fibrolite_find_libraries)
   endif()
   find_package(ZLIB REQUIRED)
   fibrolite_import(lib3mf::lib3mf Model/COM/NMR_DLLInterfaces.h 3MF lib3mf)
-  set(CGAL_DO_NOT_WARN_ABOUT_CMAKE_BUILD_TYPE TRUE)
-  find_package(CGAL 5.5 REQUIRED)
+  fibrolite_import(GMP::mpfr mpfr.h mpfr) # CGAL itself is headers only, found where the compiler looks
+  fibrolite_import(GMP::gmp gmp.h gmp)
   foreach(module core imgproc imgcodecs) # OpenCV's config file comes with all of OpenCV only
     fibrolite_import(OpenCV::${module} opencv2/${module}.hpp opencv_${module} opencv4)
   endforeach()

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double most_samples = 500000;
 
-/// Sums over samples: enough for the centroid and the covariance.
+/// Sums over samples (or integrals over volume): enough for the centroid and the covariance.
 struct Moments {
   double count = 0;
   Vec3d sum{};
@@ -32,6 +32,17 @@ struct Moments {
     sum = sum + p;
     const std::array<double, 6> product{p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.y * p.z, p.z * p.x};
     for (std::size_t k = 0; k < 6; ++k) square[k] += product[k];
+  }
+  /// The tetrahedron (0, a, b, c), signed volume; its second moment is v/20 (sum p p' + (sum p)(sum p)').
+  void add_tetrahedron(Vec3d a, Vec3d b, Vec3d c) {
+    const double volume = dot(a, cross(b, c)) / 6;
+    const Vec3d total = a + b + c;
+    count += volume;
+    sum = sum + 0.25 * volume * total;
+    for (const Vec3d p : {a, b, c, total}) {
+      const std::array<double, 6> product{p.x * p.x, p.y * p.y, p.z * p.z, p.x * p.y, p.y * p.z, p.z * p.x};
+      for (std::size_t k = 0; k < 6; ++k) square[k] += volume / 20 * product[k];
+    }
   }
   void add(const Moments& other) {
     count += other.count;
@@ -132,23 +143,37 @@ std::vector<PartGeometry> part_geometry(const Proxy& proxy, const Labels& labels
   return result;
 }
 
-Parts whole_body(const Proxy& proxy, Kind kind) {
+Parts whole_body(const Mesh& model, Kind kind) {
+  const Box3d box = bounds(model);
+  Moments inside;
+  for (const Mesh::Triangle& t : model.triangles) {
+    inside.add_tetrahedron(to_double(model.vertices[t[0]]) - box.center(),
+                           to_double(model.vertices[t[1]]) - box.center(),
+                           to_double(model.vertices[t[2]]) - box.center());
+  }
+  const double volume = inside.count;
+  const Vec3d along = longest_principal_axis(inside);
+  const Vec3d centroid = volume > 0 ? box.center() + inside.sum / volume : box.center();
+  double low = 0, high = 0;
+  for (const Vec3f& vertex : model.vertices) {
+    const double at = dot(to_double(vertex) - centroid, along);
+    low = std::min(low, at);
+    high = std::max(high, at);
+  }
+  const double length = high - low;
   const Labels labels;
-  PartGeometry geometry = part_geometry(proxy, labels).front();
-  const double volume = proxy.solid.volume_mm3();
-  const double length = geometry.axis.length_mm();
   Parts parts;
-  parts.parts.push_back(
-      PartMaker::make({.id = 0,
-                       .kind = kind,
-                       .region = labels.region(0),
-                       .bounds_mm = geometry.bounds_mm,
-                       .axis = std::move(geometry.axis),
-                       .diameter_mm = length > 0 ? std::sqrt(4 * volume / (std::numbers::pi * length)) : 0,
-                       .volume_mm3 = volume,
-                       .centroid_mm = geometry.centroid_mm,
-                       .stress = {},
-                       .reason = std::string(name(kind)) + ": chosen for the whole body"}));
+  parts.parts.push_back(PartMaker::make(
+      {.id = 0,
+       .kind = kind,
+       .region = labels.region(0),
+       .bounds_mm = box,
+       .axis = length > 0 ? Axis::straight(centroid + low * along, centroid + high * along) : Axis(),
+       .diameter_mm = length > 0 && volume > 0 ? std::sqrt(4 * volume / (std::numbers::pi * length)) : 0,
+       .volume_mm3 = volume,
+       .centroid_mm = centroid,
+       .stress = {},
+       .reason = std::string(name(kind)) + ": chosen for the whole body"}));
   parts.labels = labels;
   return parts;
 }

@@ -48,6 +48,6 @@ struct Verification {
 
 /// The whole body as one part of a given kind, for runs that skip partition and verification. A column's axis is the
 /// longest principal axis of the body.
-[[nodiscard]] Parts whole_body(const Proxy& proxy, Kind kind);
+[[nodiscard]] Parts whole_body(const Mesh& model, Kind kind);
 
 }  // namespace fibrolite
