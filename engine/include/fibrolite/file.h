@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -23,6 +24,9 @@ class OutputFile {
   /// @throws Error Io: disk full or any other failure of the system.
   void write(std::span<const std::byte> bytes);
   void write(std::string_view text);
+  /// Replace bytes that were already written, at most as far as the file goes.
+  void overwrite(std::uint64_t offset, std::span<const std::byte> bytes);
+  /// @throws Error Io; Cancelled, if discard_uncommitted_files() came first.
   void commit();
 
  private:
