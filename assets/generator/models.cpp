@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "models.h"
+#include "bundled_models.h"
 
 #include <algorithm>
 #include <array>
@@ -15,25 +15,40 @@
 namespace fibrolite {
 namespace {
 
-/// A limb through balls given by centre and radius.
+/// A ball that a limb passes through.
 struct Ball {
   Vec3d center;
   double radius_mm;
 };
-Shape limb(const std::vector<Ball>& balls, double blend_mm) {
-  Shape whole = sphere(balls[0].center, balls[0].radius_mm);
-  for (std::size_t i = 1; i < balls.size(); ++i) {
-    const Ball &a = balls[i - 1], &b = balls[i];
-    whole = smooth_unite(whole, round_cone(a.center, a.radius_mm, b.center, b.radius_mm), blend_mm);
+Ball operator+(Ball a, Ball b) { return {a.center + b.center, a.radius_mm + b.radius_mm}; }
+Ball operator*(double s, Ball a) { return {s * a.center, s * a.radius_mm}; }
+
+/// The hull of balls that glide along a Catmull-Rom spline, in centre and radius, through those given.
+Shape limb(const std::vector<Ball>& balls) {
+  constexpr int steps = 8;
+  if (balls.size() == 1) return sphere(balls[0].center, balls[0].radius_mm);
+  std::vector<Shape> pieces;
+  Ball last = balls[0];
+  for (std::size_t i = 0; i + 1 < balls.size(); ++i) {
+    const Ball p1 = balls[i], p2 = balls[i + 1];
+    const Ball p0 = i > 0 ? balls[i - 1] : 2.0 * p1 + -1.0 * p2;
+    const Ball p3 = i + 2 < balls.size() ? balls[i + 2] : 2.0 * p2 + -1.0 * p1;
+    for (int k = 1; k <= steps; ++k) {
+      const double t = static_cast<double>(k) / steps, t2 = t * t, t3 = t2 * t;
+      const Ball next =
+          0.5 * ((-t + 2 * t2 - t3) * p0 + (2 - 5 * t2 + 3 * t3) * p1 + (t + 4 * t2 - 3 * t3) * p2 + (t3 - t2) * p3);
+      pieces.push_back(round_cone(last.center, last.radius_mm, next.center, next.radius_mm));
+      last = next;
+    }
   }
-  return whole;
+  return unite(std::move(pieces));
 }
 
-/// The limb and its mirror image across the plane y = 0 (axis 1) or x = 0 (axis 0).
-Shape pair(std::vector<Ball> balls, double blend_mm, int axis) {
-  const Shape one = limb(balls, blend_mm);
+/// The limb and its mirror image in x (axis 0) or y (axis 1), blended where they meet.
+Shape pair(std::vector<Ball> balls, int axis, double blend_mm = 0) {
+  const Shape one = limb(balls);
   for (Ball& ball : balls) (axis == 0 ? ball.center.x : ball.center.y) *= -1;
-  return unite({one, limb(balls, blend_mm)});
+  return smooth_unite(one, limb(balls), blend_mm);
 }
 
 Shape smooth_subtract(const Shape& a, const Shape& b, double blend_mm) {
@@ -47,75 +62,84 @@ Shape rounded_cylinder(Vec3d a, Vec3d b, double radius_mm, double edge_mm) {
   return offset(cylinder(a + inward, b - inward, radius_mm - edge_mm), edge_mm);
 }
 
-/// Flat feet: what lies below the ground is cut off.
-Shape standing(const Shape& shape) { return intersect({shape, half_space({}, {0, 0, -1})}); }
+/// Flat feet with a soft edge: what lies below the ground is cut off.
+Shape standing(const Shape& shape) { return smooth_subtract(shape, half_space({}, {0, 0, 1}), 2); }
 
 // A stocky hoofed animal, nose along +x. The legs are about a third of the body's thickness, yet wide enough for
 // fibres.
 Shape quadruped() {
-  Shape body = limb({{{-31, 0, 47}, 13.5}, {{-10, 0, 45}, 14.0}, {{16, 0, 46}, 15.0}}, 4);
-  const Shape neck = limb({{{20, 0, 52}, 11}, {{32, 0, 68}, 7.5}}, 2);
-  const Shape head = limb({{{33, 0, 71}, 7.2}, {{40, 0, 68.5}, 6.0}, {{49, 0, 63}, 4.6}}, 2);
-  const Shape ears = pair({{{31, 4.2, 76}, 2.6}, {{29.5, 5.6, 82.5}, 1.4}}, 0.5, 1);
+  const Shape trunk = limb({{{-31, 0, 47}, 13.2}, {{-10, 0, 45.5}, 13.6}, {{15, 0, 46}, 14.6}});
+  const Shape neck = limb({{{14, 0, 48}, 12.5}, {{23, 0, 57}, 9.4}, {{31, 0, 68}, 7.2}, {{33, 0, 72}, 6.6}});
+  const Shape head = limb({{{32, 0, 72}, 6.6}, {{40, 0, 68.5}, 5.6}, {{49, 0, 62.5}, 4.4}});
+  const Shape ears = pair({{{31.5, 3.8, 76}, 2.5}, {{30.0, 5.0, 80}, 2.3}, {{29.5, 5.6, 83.5}, 1.3}}, 1);
   const Shape front =
-      pair({{{19, 7, 42}, 8.0}, {{20.5, 8, 28}, 6.0}, {{20.5, 8.3, 17}, 5.0}, {{20, 8.5, 7}, 4.6}}, 2, 1);
+      pair({{{18, 6.5, 44}, 8.5}, {{20, 7.8, 31}, 6.4}, {{20.5, 8.3, 20}, 5.0}, {{20, 8.5, 5}, 4.5}}, 1);
   const Shape hind =
-      pair({{{-32, 7, 44}, 10.5}, {{-27.5, 8, 30}, 7.2}, {{-34, 8.5, 18}, 5.0}, {{-32.5, 8.5, 7}, 4.6}}, 2.5, 1);
-  const Shape hooves = unite({pair({{{20, 8.5, 7}, 4.4}, {{21, 8.5, -1}, 6.0}}, 1, 1),
-                              pair({{{-32.5, 8.5, 7}, 4.4}, {{-31.5, 8.5, -1}, 6.0}}, 1, 1)});
-  const Shape tail = limb({{{-42, 0, 53}, 3.4}, {{-48.5, 0, 46}, 3.0}, {{-51, 0, 34}, 3.0}, {{-51, 0, 24}, 2.0}}, 1.5);
-  body = smooth_unite(body, neck, 7);
-  body = smooth_unite(body, head, 3.5);
+      pair({{{-31, 6.5, 46}, 11}, {{-29, 7.8, 33}, 8.0}, {{-34, 8.5, 19}, 5.0}, {{-32.5, 8.5, 5}, 4.5}}, 1);
+  std::vector<Shape> hooves;
+  for (const double x : {20.6, -31.9}) {
+    for (const double y : {-8.5, 8.5}) hooves.push_back(rounded_cylinder({x, y, 0}, {x, y, 5.5}, 5.3, 1.2));
+  }
+  const Shape tail = limb({{{-40, 0, 54}, 3.6}, {{-47, 0, 49}, 3.0}, {{-50.5, 0, 38}, 3.0}, {{-51, 0, 25}, 1.9}});
+  Shape body = smooth_unite(trunk, neck, 5);
+  body = smooth_unite(body, head, 2.5);
   body = smooth_unite(body, ears, 1.5);
-  body = smooth_unite(body, unite({smooth_unite(front, hooves, 1.5), smooth_unite(hind, hooves, 1.5)}), 5);
-  return standing(smooth_unite(body, tail, 3));
+  const Shape legs = smooth_unite(unite({front, hind}), unite(hooves), 2.5);
+  body = smooth_unite(body, legs, 5);
+  return smooth_unite(body, tail, 3);
 }
 
 // A lower molar: four cusps round a fossa, two roots that are free from about half the height down.
 Shape molar() {
-  Shape crown = nothing();
+  Shape crown = round_cone({0, 0, 54}, 15, {0, 0, 63}, 16);
   for (const double sx : {-1.0, 1.0}) {
     for (const double sy : {-1.0, 1.0}) {
-      const Shape lobe =
-          limb({{{sx * 11, sy * 7, 53}, 10}, {{sx * 13.2, sy * 9.2, 64}, 11}, {{sx * 12, sy * 8.6, 76}, 4.6}}, 2);
-      crown = smooth_unite(crown, lobe, 7);
+      const Shape lobe = limb({{{sx * 10, sy * 6.5, 49}, 8.6},
+                               {{sx * 13, sy * 9, 59}, 10.6},
+                               {{sx * 13, sy * 9, 68}, 9},
+                               {{sx * 12, sy * 8.4, 75}, 5}});
+      crown = smooth_unite(crown, lobe, 6);
     }
   }
-  crown = smooth_unite(crown, round_cone({0, 0, 55}, 15, {0, 0, 62}, 15), 6);
-  crown = smooth_subtract(crown, sphere({0, 0, 83}, 11.5), 6);
-  crown = smooth_subtract(crown, capsule({-40, 0, 80}, {40, 0, 80}, 3.6), 5);
-  crown = smooth_subtract(crown, capsule({0, -40, 80}, {0, 40, 80}, 3.2), 5);
+  crown = smooth_subtract(crown, sphere({0, 0, 84}, 12), 7);
+  crown = smooth_subtract(crown, capsule({-40, 0, 81.5}, {40, 0, 81.5}, 3.5), 6);
+  crown = smooth_subtract(crown, capsule({0, -40, 81.5}, {0, 40, 81.5}, 3.2), 6);
   std::vector<Shape> roots;
-  for (const double sx : {-1.0, 1.0}) {
-    std::vector<Shape> halves;
-    for (const double sy : {-1.0, 1.0}) {  // roots are broader across than along the jaw
-      halves.push_back(limb(
-          {{{sx * 12, sy * 4.0, 50}, 8.4}, {{sx * 14.2, sy * 3.2, 28}, 6.4}, {{sx * 12.5, sy * 1.0, 4.5}, 4.4}}, 2));
-    }
-    roots.push_back(smooth_unite(halves[0], halves[1], 4));
+  for (const double sx : {-1.0, 1.0}) {  // broader across the jaw than along it
+    roots.push_back(pair({{{sx * 11.5, 4.2, 52}, 8.0},
+                          {{sx * 13.4, 3.6, 36}, 6.6},
+                          {{sx * 13.8, 2.6, 20}, 5.6},
+                          {{sx * 12, 1.0, 4}, 4.0}},
+                         1, 4));
   }
   return smooth_unite(crown, unite(roots), 5);
 }
 
 // A standing human figure that faces -y, arms held a little away.
 Shape figure() {
-  const Shape chest = pair({{{6.2, 0.5, 91}, 8.6}, {{4.0, 0, 76}, 7.4}}, 3, 0);
-  const Shape hips = pair({{{5.0, 0.5, 66}, 8.2}}, 2, 0);
-  const Shape shoulders = capsule({-13.5, 0.5, 95}, {13.5, 0.5, 95}, 5.4);
-  const Shape neck = capsule({0, 0.5, 98}, {0, 0, 107}, 4.0);
-  const Shape head = limb({{{0, 0.3, 114}, 7.0}, {{0, -1.3, 109.5}, 5.2}}, 2);
-  const Shape arms = pair({{{14.5, 0.5, 95}, 5.2},
-                           {{23, 1.5, 76}, 4.2},
-                           {{23.7, 1.0, 73}, 4.3},
-                           {{29.5, -2.5, 57}, 3.3},
-                           {{31.5, -3.5, 51}, 3.9},
-                           {{32.5, -4.2, 47}, 2.6}},
-                          1.5, 0);
-  const Shape legs =
-      pair({{{7.2, 0.5, 62}, 8.2}, {{8.8, -0.5, 36}, 5.8}, {{9.4, 1.2, 25}, 5.7}, {{10, 0.8, 7}, 4.1}}, 2.5, 0);
-  const Shape feet = pair({{{10, 1.6, 3.2}, 4.4}, {{11.2, -10, 1.6}, 4.2}}, 1, 0);
-  Shape body = smooth_unite(chest, hips, 6);
-  body = smooth_unite(body, shoulders, 5);
+  const Shape chest =
+      pair({{{6.4, 0.6, 92}, 7.8}, {{5.4, 0.2, 82}, 7.4}, {{4.4, 0.4, 73}, 6.8}, {{5.0, 0.8, 65}, 7.6}}, 0, 9);
+  const Shape shoulders =
+      limb({{{-14.6, 0.8, 95.0}, 4.6}, {{-7, 0.4, 97}, 4.8}, {{7, 0.4, 97}, 4.8}, {{14.6, 0.8, 95.0}, 4.6}});
+  const Shape neck = capsule({0, 0.8, 98}, {0, 0, 108}, 3.7);
+  const Shape head = limb({{{0, 0.6, 114.0}, 6.4}, {{0, -0.6, 110.5}, 5.6}, {{0, -1.8, 107.6}, 4.0}});
+  const Shape arms = pair({{{15.4, 0.8, 95}, 4.8},
+                           {{20, 1.4, 85}, 4.5},
+                           {{24, 1.2, 74}, 3.8},
+                           {{27.4, -0.6, 65}, 3.8},
+                           {{30.2, -2.6, 56}, 2.9},
+                           {{31.8, -3.8, 50.5}, 3.5},
+                           {{32.8, -4.8, 45.5}, 2.4}},
+                          0);
+  const Shape legs = pair({{{6.8, 0.8, 63}, 7.6},
+                           {{8.0, 0.2, 50}, 6.7},
+                           {{9.0, -0.2, 35}, 5.3},
+                           {{9.4, 1.2, 26}, 5.5},
+                           {{10, 1.2, 13}, 4.1},
+                           {{10.2, 1.2, 4}, 3.9}},
+                          0);
+  const Shape feet = pair({{{10.2, 2.4, 2.6}, 4.0}, {{10.8, -4, 2.4}, 3.8}, {{11.6, -11, 1.2}, 3.6}}, 0);
+  Shape body = smooth_unite(chest, shoulders, 6);
   body = smooth_unite(body, neck, 4);
   body = smooth_unite(body, head, 2);
   body = smooth_unite(body, arms, 3);
@@ -129,14 +153,14 @@ Shape bracket() {
   for (const double sx : {-1.0, 1.0}) {
     body = smooth_unite(body, rounded_cylinder({sx * 38, 0, 0}, {sx * 38, 0, 17}, 11.5, 1.2), 3);
   }
-  Shape hub = rounded_cylinder({0, 0, 62}, {0, 0, 80}, 20, 1.5);
+  Shape hub = rounded_cylinder({0, 0, 62}, {0, 0, 80}, 20, 2);
   const std::array<Vec2d, 3> feet{{{0, 20}, {-19, -15}, {19, -15}}};
   for (const Vec2d& foot : feet) {
-    const double inward = 15 / norm(foot);
-    hub = smooth_unite(hub, capsule({foot.x, foot.y, 4}, {inward * foot.x, inward * foot.y, 68}, 5.2), 2.5);
+    const double inward = 14 / norm(foot);
+    hub = smooth_unite(hub, capsule({foot.x, foot.y, 4}, {inward * foot.x, inward * foot.y, 68}, 4.9), 2);
   }
   body = smooth_unite(body, hub, 4);
-  body = smooth_subtract(body, cylinder({0, 0, 50}, {0, 0, 90}, 11), 1.5);
+  body = smooth_subtract(body, cylinder({0, 0, 50}, {0, 0, 90}, 11), 2.5);
   for (const double sx : {-1.0, 1.0}) {
     body = smooth_subtract(body, cylinder({sx * 38, 0, -20}, {sx * 38, 0, 30}, 5), 1.2);
   }
@@ -157,7 +181,10 @@ Shape bent_tube() {
   const Shape arc =
       intersect({torus(frame_along(middle, {0, 1, 0}), bend, radius), half_space({0, 0, rise - lap}, {0, 0, -1}),
                  half_space(end + lap * direction, direction)});
-  return unite({cylinder({0, 0, 0}, {0, 0, rise}, radius), arc, cylinder(end, end + run * direction, radius)});
+  const Vec3d tip = end + run * direction;
+  const Shape bar =
+      unite({cylinder({0, 0, -10}, {0, 0, rise}, radius), arc, cylinder(end, tip + 10 * direction, radius)});
+  return standing(smooth_subtract(bar, half_space(tip, -direction), 2));
 }
 
 Shape y_branch() {
@@ -181,8 +208,8 @@ const std::array<Model, 8>& models() {
       {"quadruped", quadruped, {{-60, -26, -4}, {60, 26, 90}}, 0.85, {}, 100},
       {"molar", molar, {{-32, -28, -6}, {32, 28, 90}}, 1.0, Vec3d{50, 40, 80}},
       {"figure", figure, {{-42, -22, -4}, {42, 18, 126}}, 0.8, {}, 120},
-      {"bracket", bracket, {{-58, -36, -4}, {58, 36, 86}}, 1.1, {}, 0},
-      {"cylinder_on_box", cylinder_on_box, {{-25, -25, -5}, {25, 25, 75}}, 0.8, {}, 0},
+      {"bracket", bracket, {{-58, -36, -4}, {58, 36, 86}}, 1.0, {}, 0},
+      {"cylinder_on_box", cylinder_on_box, {{-25, -25, -5}, {25, 25, 75}}, 0.65, {}, 0},
       {"bent_tube", bent_tube, {{-14, -14, -4}, {70, 14, 96}}, 0.8, {}, 0},
       {"y", y_branch, {{-46, -16, -4}, {46, 16, 104}}, 0.8, {}, 0},
       {"torus", ring, {{-50, -50, -14}, {50, 50, 14}}, 0.9, {}, 0},
@@ -215,7 +242,8 @@ Mesh bundled_model(const std::string& name, const Context& context) {
   const auto found = std::find_if(models().begin(), models().end(), [&](const Model& m) { return m.name == name; });
   if (found == models().end()) throw Error(Code::BadInput, "no bundled model of this name", name);
   const Solid solid = realize(found->shape(), found->region, Grid{found->voxel_mm, 3}, context.part(0, 0.6, "voxels"));
-  Mesh mesh = surface(solid, {}, context.part(0.6, 1, "surface"));
+  // Plain vertices: moved ones would stand proud of the flat faces along sharp edges.
+  Mesh mesh = surface(solid, {.keep_volume = false}, context.part(0.6, 1, "surface"));
   place(mesh, *found);
   return mesh;
 }
