@@ -25,6 +25,8 @@ class WindingTree {
   };
   /// Cost: O(log n).
   [[nodiscard]] Nearest nearest(Vec3d p) const;
+  /// Is every edge run through as often one way as the other? Then winding() is a whole number off the surface.
+  [[nodiscard]] bool closed() const;
 
  private:
   struct Impl;

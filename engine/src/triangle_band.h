@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// The engine behind to_solid: exact distances to a triangle mesh in a band around it, block by block.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include "fibrolite/context.h"
+#include "fibrolite/mesh.h"
+#include "fibrolite/winding.h"
+#include "surface_topology.h"
+
+namespace fibrolite {
+
+struct BandParams {
+  double voxel_mm = 0;
+  float outside_vox = 0, inside_vox = 0;  ///< Where the band ends on either side.
+  /// false: side by pseudonormal near the surface; the mesh must be closed and must not overlap itself. true: side by
+  /// winding number everywhere, for any mesh; where the number passes 1/2 away from all triangles the values rise away
+  /// from there, but are no distances.
+  bool by_winding = false;
+};
+struct Band {
+  openvdb::FloatTree::Ptr tree;  ///< Background +outside, inner tiles and clamped values -inside, mm.
+  /// Pairs of neighbouring samples on different sides, with the mesh between them and without (by_winding only).
+  std::int64_t sides_by_mesh = 0, sides_by_winding = 0;
+};
+[[nodiscard]] Band triangle_band(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding,
+                                 const BandParams& params, const Context& context);
+
+}  // namespace fibrolite

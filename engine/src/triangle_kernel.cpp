@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "triangle_kernel.h"
+
+#include <cmath>
+#include <limits>
+
+#define FIBROLITE_INLINE static inline __attribute__((always_inline))
+// Vectors are passed only between inlined functions, so no call depends on how they are passed.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace fibrolite {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+/// Rounding of a culling bound, voxels.
+constexpr float slack = 2e-4F;
+
+}  // namespace
+
+// The kernels exist for the plain instruction set and for AVX2. Neither fuses a * b + c, so both give the same bits.
+namespace plain {
+#include "triangle_kernel.inc"
+}
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC target("avx2")
+namespace avx2 {
+#include "triangle_kernel.inc"
+}
+#pragma GCC pop_options
+namespace {
+const bool has_avx2 = __builtin_cpu_supports("avx2") != 0;
+}
+#define FIBROLITE_CALL(function, ...) has_avx2 ? avx2::function(__VA_ARGS__) : plain::function(__VA_ARGS__)
+#else
+#define FIBROLITE_CALL(function, ...) plain::function(__VA_ARGS__)
+#endif
+
+TriangleFrame make_frame(Vec3d a, Vec3d b, Vec3d c, std::uint32_t triangle) {
+  std::array<Vec3d, 3> v{a, b, c};
+  Vec3d normal = cross(b - a, c - a);
+  const std::array<double, 3> edges{norm(b - a), norm(c - b), norm(a - c)};
+  const int longest = edges[0] >= edges[1] && edges[0] >= edges[2] ? 0 : edges[1] >= edges[2] ? 1 : 2;
+  const double length = edges[static_cast<std::size_t>(longest)];
+  const bool flat = !(norm(normal) > 1e-12 * length * length);
+  Vec3d u = length > 0
+                ? (v[static_cast<std::size_t>((longest + 1) % 3)] - v[static_cast<std::size_t>(longest)]) / length
+                : Vec3d{1, 0, 0};
+  if (flat) {
+    const Vec3d helper = std::abs(u.x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
+    normal = cross(u, helper);
+    v = {v[static_cast<std::size_t>(longest)], v[static_cast<std::size_t>((longest + 1) % 3)], {}};
+  }
+  normal = normalized(normal);
+  const auto f = [](double x) { return static_cast<float>(x); };
+  TriangleFrame t;
+  t.triangle = triangle;
+  t.n[0] = f(normal.x), t.n[1] = f(normal.y), t.n[2] = f(normal.z), t.h = f(-dot(normal, v[0]));
+  for (std::size_t i = 0; i < 3; ++i) {
+    // Without area: the longest edge three times, with outward sides that can never all be negative.
+    const Vec3d from = flat ? v[0] : v[i], to = flat ? v[1] : v[(i + 1) % 3];
+    const Vec3d direction = flat ? u : normalized(to - from);
+    Vec3d out = cross(direction, normal);
+    if (flat && i == 1) out = -out;
+    const double e = dot(out, from);
+    t.out[i][0] = f(out.x), t.out[i][1] = f(out.y), t.out[i][2] = f(out.z), t.e[i] = f(-e);
+    t.along[i][0] = f(direction.x), t.along[i][1] = f(direction.y), t.along[i][2] = f(direction.z);
+    t.before[i] = f(dot(direction, from));
+    t.past[i] = f(-dot(direction, to));
+  }
+  return t;
+}
+
+ClosestFeature closest_feature(const TriangleFrame& t, Vec3f p) {
+  const auto linear = [&](const float* v) { return v[0] * p.x + v[1] * p.y + v[2] * p.z; };
+  const float h = t.h + linear(t.n);
+  float e[3], x[3];
+  bool inside = true;
+  int best = 0;
+  float best_m = infinity;
+  for (int i = 0; i < 3; ++i) {
+    e[i] = t.e[i] + linear(t.out[i]);
+    const float a = linear(t.along[i]), before = t.before[i] - a, past = a + t.past[i];
+    x[i] = past > 0 ? past : before > 0 ? -before : 0.0F;
+    inside = inside && e[i] < 0;
+    const float m = e[i] * e[i] + x[i] * x[i];
+    if (m < best_m) {
+      best_m = m;
+      best = i;
+    }
+  }
+  Vec3f offset{h * t.n[0], h * t.n[1], h * t.n[2]};
+  if (inside) return {ClosestFeature::face, 0, offset};
+  const float *out = t.out[best], *along = t.along[best];
+  offset = {offset.x + e[best] * out[0] + x[best] * along[0], offset.y + e[best] * out[1] + x[best] * along[1],
+            offset.z + e[best] * out[2] + x[best] * along[2]};
+  if (x[best] > 0) return {ClosestFeature::vertex, (best + 1) % 3, offset};
+  if (x[best] < 0) return {ClosestFeature::vertex, best, offset};
+  return {ClosestFeature::edge, best, offset};
+}
+
+void nearest_to_centers(const TriangleFrame* frames, const std::uint32_t* list, int count, const EightBoxes& boxes,
+                        EightNearest& nearest) {
+  FIBROLITE_CALL(nearest_to_centers, frames, list, count, boxes, nearest);
+}
+
+void cull(const TriangleFrame* frames, const std::uint32_t* list, int count, const EightBoxes& boxes,
+          const EightNearest& nearest, const float reach[8], std::uint32_t* const lists[8], int counts[8]) {
+  FIBROLITE_CALL(cull, frames, list, count, boxes, nearest, reach, lists, counts);
+}
+
+void distances_64(const TriangleFrame* frames, const std::uint32_t* list, int count, Vec3f corner, float d2[64],
+                  std::int32_t frame[64]) {
+  FIBROLITE_CALL(distances_64, frames, list, count, corner, d2, frame);
+}
+
+}  // namespace fibrolite
