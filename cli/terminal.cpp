@@ -127,7 +127,9 @@ Terminal::Terminal(const RunOptions& options) : state_(std::make_unique<State>()
   state->context = Context(progress, log);
   running = &state->context;
   handle_signals(on_signal);
-  std::signal(SIGPIPE, SIG_IGN);  // a child that crashed, or a closed stdout, is an error to report, not an end
+  // A child that crashed, a closed stdout and a file-size limit are errors to report, not ends.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 Terminal::~Terminal() {

@@ -1,1 +1,289 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Whatever is wrong with what the user gives: one clear line, the right exit code, and no file left behind.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <bit>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "fibrolite/mesh_io.h"
+#include "run_program.h"
+
+namespace fibrolite {
+namespace {
+
+using namespace fibrolite::testing;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+namespace fs = std::filesystem;
+
+enum { Done = 0, Usage = 2, BadModel = 3, BadRecipe = 4, OutOfMemory = 5, NoOutput = 7 };
+
+class BadInput : public ::testing::Test {
+ protected:
+  TempDir models, outputs;
+
+  fs::path model(const std::string& name, const std::string& bytes) {
+    std::ofstream(models / name, std::ios::binary) << bytes;
+    return models / name;
+  }
+  fs::path good_model() {
+    const fs::path path = models / "cube.stl";
+    write_mesh(path, cube(20));
+    return path;
+  }
+
+  /// Runs and expects: this exit code, one line of error, nothing written. Returns the line.
+  std::string refused(const std::vector<std::string>& arguments, int code) {
+    const Finished run = run_program(FIBROLITE_PROGRAM, arguments);
+    EXPECT_EQ(run.code, code) << run.err;
+    EXPECT_THAT(run.err, StartsWith("fibrolite: error: "));
+    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_THAT(names_in(outputs.path()), IsEmpty());
+    return run.err;
+  }
+  std::string refused_model(const fs::path& path) {
+    return refused({"generate", path, "-o", outputs / "out.stl", "--voxel", "0.4"}, BadModel);
+  }
+  std::string refused_option(const std::vector<std::string>& options, int code) {
+    std::vector<std::string> arguments{"generate", good_model(), "-o", outputs / "out.stl"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return refused(arguments, code);
+  }
+};
+
+// ---- models
+
+/// A binary STL with these triangles, nine floats each.
+std::string binary_stl(const std::vector<std::array<float, 9>>& triangles) {
+  std::string bytes(80, '\0');
+  const auto put = [&](const auto& value) {
+    const auto raw = std::bit_cast<std::array<char, sizeof value>>(value);
+    bytes.append(raw.data(), raw.size());
+  };
+  put(static_cast<std::uint32_t>(triangles.size()));
+  for (const auto& corners : triangles) {
+    for (int i = 0; i < 3; ++i) put(0.0F);
+    for (const float c : corners) put(c);
+    put(std::uint16_t{0});
+  }
+  return bytes;
+}
+const std::vector<std::array<float, 9>> tetrahedron{
+    {0, 0, 0, 0, 9, 0, 9, 0, 0}, {0, 0, 0, 9, 0, 0, 0, 0, 9}, {0, 0, 0, 0, 0, 9, 0, 9, 0}, {9, 0, 0, 0, 9, 0, 0, 0, 9}};
+
+TEST_F(BadInput, MissingModel) { EXPECT_THAT(refused_model(models / "nowhere.stl"), HasSubstr("nowhere.stl")); }
+TEST_F(BadInput, AFolderAsModel) { refused_model(models.path()); }
+TEST_F(BadInput, EmptyFiles) {
+  for (const char* name : {"a.stl", "a.obj", "a.ply", "a.off", "a.3mf", "a.vdb"}) refused_model(model(name, ""));
+}
+TEST_F(BadInput, TextNamedStl) { refused_model(model("letter.stl", "Dear reader,\nthis is no model.\n")); }
+TEST_F(BadInput, TextNamedAsEveryFormat) {
+  for (const char* name : {"a.obj", "a.ply", "a.off", "a.3mf", "a.vdb"})
+    refused_model(model(name, "Dear reader,\nthis is no model.\n"));
+}
+TEST_F(BadInput, UnknownEnding) { refused_model(model("a.xyz", "0 0 0\n")); }
+TEST_F(BadInput, TruncatedBinaryStl) {
+  const std::string whole = binary_stl(tetrahedron);
+  refused_model(model("cut.stl", whole.substr(0, whole.size() - 30)));
+  refused_model(model("head.stl", whole.substr(0, 84)));
+}
+TEST_F(BadInput, CoordinatesThatAreNoNumbers) {
+  for (const float bad : {std::nanf(""), HUGE_VALF, -HUGE_VALF}) {
+    auto triangles = tetrahedron;
+    triangles[2][4] = bad;
+    refused_model(model("bad.stl", binary_stl(triangles)));
+  }
+  refused_model(model("bad.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"));
+}
+TEST_F(BadInput, IndexOutOfRange) {
+  refused_model(model("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"));
+  refused_model(model("bad.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"));
+}
+TEST_F(BadInput, NoTriangles) {
+  refused_model(model("none.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"));
+  refused_model(model("none.stl", binary_stl({})));
+}
+TEST_F(BadInput, AllInOnePlane) {
+  refused_model(model("flat.stl", binary_stl({{0, 0, 0, 9, 0, 0, 0, 9, 0}, {9, 0, 0, 9, 9, 0, 0, 9, 0}})));
+}
+TEST_F(BadInput, AnOpenSheet) {
+  // A roof: two slopes that meet in a ridge, nothing below.
+  refused_model(
+      model("roof.obj", "v 0 0 0\nv 20 0 0\nv 20 10 5\nv 0 10 5\nv 20 20 0\nv 0 20 0\nf 1 2 3 4\nf 4 3 5 6\n"));
+}
+TEST_F(BadInput, PartitionAndCheckRefuseItToo) {
+  refused({"partition", model("a.stl", ""), "-o", outputs / "out.ply"}, BadModel);
+  refused({"check", models / "nowhere.stl"}, BadModel);
+}
+
+// ---- command line
+
+TEST_F(BadInput, VoxelsThatAreNone) {
+  for (const char* voxel : {"0", "-1", "nan", "inf", "1e999", "0.4mm", "", "abc", "0x1"})
+    EXPECT_THAT(refused_option({"--voxel", voxel}, Usage), HasSubstr("--voxel")) << voxel;
+}
+TEST_F(BadInput, SizesThatAreNone) {
+  for (const char* size : {"0", "-100", "nan", "inf"}) refused_option({"--size", size}, Usage);
+}
+TEST_F(BadInput, OtherNumbers) {
+  for (const char* threads : {"0", "-2", "1.5", "many"}) refused_option({"--threads", threads}, Usage);
+  for (const char* memory : {"0", "-4G", "4X", "nan", "G", ""}) refused_option({"--max-memory", memory}, Usage);
+  for (const char* seed : {"-1", "1.5", "x"}) refused_option({"--seed", seed}, Usage);
+}
+TEST_F(BadInput, UnknownNamesComeWithTheNearest) {
+  EXPECT_THAT(refused_option({"--infill", "hybird"}, Usage),
+              AllOf(HasSubstr("hybird"), HasSubstr("did you mean hybrid?")));
+  EXPECT_THAT(refused_option({"--up", "w"}, Usage), HasSubstr("did you mean"));
+  EXPECT_THAT(refused_option({"--unit", "inch"}, Usage), HasSubstr("did you mean in?"));
+  EXPECT_THAT(refused_option({"--log", "jsn"}, Usage), HasSubstr("did you mean json?"));
+  EXPECT_THAT(refused_option({"--voxle", "1"}, Usage), HasSubstr("did you mean --voxel?"));
+  EXPECT_THAT(refused({"genrate", "a.stl"}, Usage), HasSubstr("did you mean generate?"));
+}
+TEST_F(BadInput, CommandsThatDoNotExist) {
+  EXPECT_THAT(refused({}, Usage), HasSubstr("no command"));
+  EXPECT_THAT(refused({"fly", "a.stl"}, Usage), HasSubstr("unknown command 'fly'"));
+}
+TEST_F(BadInput, MissingAndSurplusArguments) {
+  refused({"generate"}, Usage);
+  refused({"generate", good_model()}, Usage);
+  refused({"generate", good_model(), "-o"}, Usage);
+  refused({"generate", good_model(), good_model(), "-o", outputs / "out.stl"}, Usage);
+  refused_option({"--voxel"}, Usage);
+  refused_option({"--voxel", "0.4", "--voxel", "0.5"}, Usage);
+}
+TEST_F(BadInput, OutputEndings) {
+  EXPECT_THAT(refused({"generate", good_model(), "-o", outputs / "out.step"}, Usage), HasSubstr(".stl"));
+  refused({"partition", good_model(), "-o", outputs / "out.stl"}, Usage);
+  refused_option({"--picture", outputs / "a.jpg"}, Usage);
+  refused_option({"--steps", outputs / "a.stl"}, Usage);
+}
+TEST_F(BadInput, OneNameForTwoOutputs) {
+  refused_option({"-o", outputs / "out.stl"}, Usage);
+  refused_option({"--report", outputs / "." / "out.stl"}, Usage);
+}
+TEST_F(BadInput, AnOutputOverTheModel) {
+  const std::string before = content(good_model());
+  refused({"generate", good_model(), "-o", good_model(), "--overwrite"}, Usage);
+  EXPECT_EQ(content(models / "cube.stl"), before);
+}
+
+// ---- recipes
+
+TEST_F(BadInput, UnknownPreset) {
+  EXPECT_THAT(refused_option({"--preset", "papper"}, BadRecipe),
+              AllOf(HasSubstr("papper"), HasSubstr("did you mean paper?")));
+}
+TEST_F(BadInput, UnknownRecipeKeys) {
+  EXPECT_THAT(refused_option({"--set", "tcs.cel_mm=5"}, BadRecipe), HasSubstr("did you mean tcs.cell_mm?"));
+  EXPECT_THAT(refused_option({"--recipe", model("r.json", R"({"mfs": {"wal_mm": 1}})")}, BadRecipe),
+              AllOf(HasSubstr("did you mean mfs.wall_mm?"), HasSubstr("r.json")));
+}
+TEST_F(BadInput, RecipesThatAreNone) {
+  refused_option({"--recipe", model("r.json", "{")}, BadRecipe);
+  refused_option({"--recipe", model("r.json", "")}, BadRecipe);
+  refused_option({"--recipe", models / "nowhere.json"}, BadRecipe);
+  refused_option({"--recipe", models.path()}, BadRecipe);
+  refused_option({"--set", "tcs.cell_mm"}, BadRecipe);
+  refused_option({"--set", "tcs.cell_mm=nan"}, BadRecipe);
+  refused({"recipe", "--set", "tcs.ball_mm=0.1"}, BadRecipe);
+}
+TEST_F(BadInput, SticksThinnerThanTwoVoxels) {
+  EXPECT_THAT(refused_option({"--voxel", "0.5"}, BadRecipe),
+              AllOf(HasSubstr("thinner than 2 voxels"), HasSubstr("--voxel 0.4")));
+  EXPECT_THAT(refused_option({"--voxel", "0.25", "--set", "tcs.stick_mm=0.4"}, BadRecipe), HasSubstr("tcs.stick_mm"));
+}
+
+// ---- memory
+
+TEST_F(BadInput, AVoxelTooSmallForTheMemory) {
+  EXPECT_THAT(refused_option({"--voxel", "0.01", "--max-memory", "500M"}, OutOfMemory),
+              AllOf(HasSubstr("500 MB"), HasSubstr("use --voxel")));
+  for (const char* voxel : {"1e-5", "1e-30", "1e-300"}) refused_option({"--voxel", voxel}, OutOfMemory);
+}
+
+// ---- outputs
+
+TEST_F(BadInput, OutputFolderMissing) {
+  EXPECT_THAT(refused({"generate", good_model(), "-o", outputs / "nowhere" / "out.stl"}, NoOutput),
+              HasSubstr("nowhere"));
+  refused({"partition", good_model(), "-o", outputs / "nowhere" / "out.ply"}, NoOutput);
+  refused_option({"--report", outputs / "nowhere" / "r.json"}, NoOutput);
+  refused_option({"--picture", outputs / "nowhere" / "p.png"}, NoOutput);
+}
+TEST_F(BadInput, OutputFolderNotWritable) {
+  // No one may make files in here, root neither.
+  refused({"generate", good_model(), "-o", "/proc/out.stl"}, NoOutput);
+  if (geteuid() == 0) return;
+  const fs::path locked = models / "locked";
+  fs::create_directory(locked);
+  fs::permissions(locked, fs::perms::owner_read | fs::perms::owner_exec);
+  refused({"generate", good_model(), "-o", locked / "out.stl"}, NoOutput);
+}
+TEST_F(BadInput, OutputExists) {
+  const fs::path existing = model("existing.stl", "mine");
+  EXPECT_THAT(refused({"generate", good_model(), "-o", existing}, NoOutput), HasSubstr("--overwrite"));
+  EXPECT_EQ(content(existing), "mine");
+  const fs::path report = model("other.report.json", "mine");
+  EXPECT_THAT(refused({"generate", good_model(), "-o", models / "other.stl"}, NoOutput),
+              HasSubstr("other.report.json"));
+  EXPECT_EQ(content(report), "mine");
+  EXPECT_THAT(names_in(models.path()), ElementsAre("cube.stl", "existing.stl", "other.report.json"));
+}
+TEST_F(BadInput, AFolderAsOutput) {
+  fs::create_directory(models / "folder.stl");
+  refused({"generate", good_model(), "-o", models / "folder.stl", "--overwrite"}, NoOutput);
+}
+TEST_F(BadInput, OutputsAreCheckedBeforeTheModelIsRead) {
+  EXPECT_THAT(refused({"generate", models / "nowhere.stl", "-o", outputs / "nowhere" / "out.stl"}, NoOutput),
+              HasSubstr("folder"));
+}
+TEST_F(BadInput, AStandardOutputThatIsFull) {
+  struct stat full {};
+  if (stat("/dev/full", &full) != 0 || !S_ISCHR(full.st_mode)) GTEST_SKIP() << "no device /dev/full here";
+  const Finished run = run_program("/bin/sh", {"-c", "exec \"$0\" recipe > /dev/full", FIBROLITE_PROGRAM});
+  EXPECT_EQ(run.code, NoOutput);
+  EXPECT_THAT(run.err, StartsWith("fibrolite: error: "));
+}
+
+// ---- what is not bad
+
+TEST_F(BadInput, HelpAndRecipeAreNoErrors) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"--help"}, {"--version"}, {"generate", "--help"}, {"recipe"}, {"recipe", "--keys"}}) {
+    const Finished run = run_program(FIBROLITE_PROGRAM, arguments);
+    EXPECT_EQ(run.code, Done);
+    EXPECT_EQ(run.err, "");
+    EXPECT_NE(run.out, "");
+  }
+  EXPECT_EQ(nlohmann::json::parse(
+                run_program(FIBROLITE_PROGRAM, {"recipe", "--preset", "paper"}).out)["partition"]["threshold"],
+            0.26);
+}
+TEST_F(BadInput, PresetThenFileThenSet) {
+  const fs::path file = model("r.json", R"({"tcs": {"stick_mm": 0.9, "ball_mm": 1.7}})");
+  const Finished run = run_program(FIBROLITE_PROGRAM, {"recipe", "--set", "tcs.ball_mm=1.8", "--seed", "7", "--preset",
+                                                       "peer-tcs", "--recipe", file});
+  const auto tcs = nlohmann::json::parse(run.out)["tcs"];
+  EXPECT_EQ(tcs["cell_mm"], 5.0);
+  EXPECT_EQ(tcs["stick_mm"], 0.9);
+  EXPECT_EQ(tcs["ball_mm"], 1.8);
+  EXPECT_EQ(nlohmann::json::parse(run.out)["seed"], 7);
+}
+TEST_F(BadInput, ADryRunWritesNothing) {
+  const Finished run = run_program(FIBROLITE_PROGRAM, {"generate", good_model(), "-o", outputs / "a b.stl", "-o",
+                                                       outputs / "c.vdb", "--dry-run", "--up", "-z", "--voxel", "0.4"});
+  EXPECT_EQ(run.code, Done) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("voxel     0.4 mm"), HasSubstr("a b.stl"), HasSubstr("c.vdb"),
+                             HasSubstr("a b.report.json")));
+  EXPECT_THAT(names_in(outputs.path()), IsEmpty());
+}
+
+}  // namespace
+}  // namespace fibrolite

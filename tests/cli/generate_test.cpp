@@ -1,1 +1,262 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// The main job through the program, on bundled models, small and coarse so that it is quick.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "fibrolite/mesh_io.h"
+#include "fibrolite/solid_io.h"
+#include "mesh_checks.h"
+#include "run_program.h"
+
+namespace fibrolite {
+namespace {
+
+using namespace fibrolite::testing;
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+const std::vector<std::string> coarse{"--size", "40", "--voxel", "0.4"};
+
+/// generate MODEL ... with the coarse options.
+std::vector<std::string> generate(const fs::path& model, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments{"generate", model};
+  arguments.insert(arguments.end(), coarse.begin(), coarse.end());
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return arguments;
+}
+Finished run(const std::vector<std::string>& arguments) {
+  Finished finished = run_program(FIBROLITE_PROGRAM, arguments);
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  return finished;
+}
+json report_in(const fs::path& file) { return json::parse(content(file)); }
+
+void expect_sound(const fs::path& file, double volume_mm3) {
+  const IndependentCount counted = count(read_mesh(file).mesh);
+  EXPECT_TRUE(counted.sound()) << file << ": " << counted.boundary_edges << " open, " << counted.nonmanifold_edges
+                               << " non-manifold edges, " << counted.nonmanifold_vertices << " vertices, "
+                               << counted.degenerate_triangles << " degenerate";
+  EXPECT_NEAR(counted.volume_mm3, volume_mm3, 1e-4 * volume_mm3) << file;
+}
+
+TEST(Generate, EveryFormatHoldsTheSameSoundMesh) {
+  const TempDir folder;
+  const Finished finished = run(generate(
+      asset("molar"), {"--infill", "tcs", "-o", folder / "a.stl", "-o", folder / "a.obj", "-o", folder / "a.ply", "-o",
+                       folder / "a.3mf", "-o", folder / "a.vdb", "--picture", folder / "a.png"}));
+  EXPECT_THAT(names_in(folder.path()),
+              ElementsAre("a.3mf", "a.obj", "a.ply", "a.png", "a.report.json", "a.stl", "a.vdb"));
+  const json report = report_in(folder / "a.report.json");
+  const double volume = report["mesh"]["volume_mm3"];
+  for (const char* name : {"a.stl", "a.obj", "a.ply", "a.3mf"}) expect_sound(folder / name, volume);
+
+  const json& solid = report["solid"];
+  EXPECT_NEAR(volume, solid["volume_mm3"].get<double>(), 0.01 * volume);
+  EXPECT_NEAR(read_vdb(folder / "a.vdb").volume_mm3(), solid["volume_mm3"].get<double>(), 1e-6 * volume);
+  EXPECT_EQ(solid["pieces"], 1);
+  EXPECT_EQ(solid["voxel_mm"], 0.4);
+  EXPECT_NEAR(solid["mass_g"].get<double>(), 1.24e-3 * solid["volume_mm3"].get<double>(), 1e-9);  // PLA
+  EXPECT_NEAR(solid["fill_ratio"].get<double>(),
+              solid["volume_mm3"].get<double>() / report["model"]["volume_mm3"].get<double>(), 0.01);
+  EXPECT_GT(solid["fill_ratio"], 0.1);
+  EXPECT_LT(solid["fill_ratio"], 0.8);
+  for (const char* defect : {"boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "degenerate_triangles"})
+    EXPECT_EQ(report["mesh"][defect], 0) << defect;
+
+  const json& size = report["model"]["size_mm"];
+  EXPECT_NEAR(std::max({size[0].get<double>(), size[1].get<double>(), size[2].get<double>()}), 40, 1e-4);
+  EXPECT_EQ(report["infill"], "tcs");
+  EXPECT_EQ(report["parts"].size(), 1U);
+  EXPECT_FALSE(report["stages"].empty());
+  EXPECT_THAT(content(folder / "a.png").substr(1, 3), "PNG");
+  EXPECT_THAT(finished.out, HasSubstr((folder / "a.3mf").string()));
+  EXPECT_EQ(finished.err, "");
+}
+
+TEST(Generate, OneAndTwoThreadsGiveTheSameBytes) {
+  const TempDir one, two;
+  const auto hybrid = [](const TempDir& folder, const char* threads) {
+    return generate(asset("quadruped"),
+                    {"-o", folder / "a.stl", "-o", folder / "a.3mf", "-o", folder / "a.vdb", "--steps",
+                     folder / "steps.vdb", "--picture", folder / "a.png", "--threads", threads, "--quiet"});
+  };
+  run(hybrid(one, "1"));
+  run(hybrid(two, "2"));
+  for (const char* name : {"a.stl", "a.3mf", "a.vdb", "steps.vdb", "a.png"})
+    EXPECT_TRUE(content(one / name) == content(two / name)) << name;
+  json a = report_in(one / "a.report.json"), b = report_in(two / "a.report.json");
+  EXPECT_EQ(a["threads"], 1);
+  EXPECT_EQ(b["threads"], 2);
+  for (json* report : {&a, &b}) {
+    report->erase("stages");
+    report->erase("threads");
+  }
+  EXPECT_EQ(a.dump(), b.dump());
+
+  // And it is a hybrid, in one sound piece.
+  EXPECT_EQ(a["solid"]["pieces"], 1);
+  expect_sound(one / "a.stl", a["mesh"]["volume_mm3"]);
+  double parts = 0;
+  for (const json& part : a["parts"]) {
+    parts += part["volume_mm3"].get<double>();
+    EXPECT_TRUE(part["kind"] == "column" || part["kind"] == "bulk");
+    EXPECT_EQ(part["infill"], part["kind"] == "column" ? "mfs" : "tcs");
+    EXPECT_NE(part["reason"], "");
+  }
+  EXPECT_GT(a["parts"].size(), 1U);
+  EXPECT_NEAR(parts, a["model"]["volume_mm3"].get<double>(), 0.02 * parts);  // every point has one part
+  for (const json& interface : a["interfaces"]) EXPECT_EQ(interface["regions_after"], 1);
+}
+
+TEST(Generate, OverwriteReplacesAndAFailedRunKeepsTheOld) {
+  const TempDir folder;
+  std::ofstream(folder / "a.stl") << "old";
+  const std::vector<std::string> options{"--infill", "solid", "-o", folder / "a.stl", "--overwrite"};
+  std::vector<std::string> too_large = options;
+  too_large.insert(too_large.end(), {"--max-memory", "1M"});
+  EXPECT_EQ(run_program(FIBROLITE_PROGRAM, generate(asset("torus"), too_large)).code, 5);
+  EXPECT_EQ(content(folder / "a.stl"), "old");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("a.stl"));
+  run(generate(asset("torus"), options));
+  EXPECT_NE(content(folder / "a.stl"), "old");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("a.report.json", "a.stl"));
+}
+
+TEST(Generate, ALinkAsOutputStaysALink) {
+  const TempDir folder;
+  std::ofstream(folder / "real.stl") << "old";
+  fs::create_symlink("real.stl", folder / "link.stl");
+  run(generate(asset("torus"), {"--infill", "solid", "-o", folder / "link.stl", "--overwrite"}));
+  EXPECT_TRUE(fs::is_symlink(folder / "link.stl"));
+  EXPECT_GT(content(folder / "real.stl").size(), 1000U);
+}
+
+TEST(Generate, ALevelSetIsAModelToo) {
+  const TempDir folder;
+  run(generate(asset("torus"), {"--infill", "solid", "-o", folder / "a.vdb", "-o", folder / "a.stl"}));
+  run({"generate", folder / "a.vdb", "--infill", "solid", "--voxel", "0.4", "-o", folder / "b.stl"});
+  const json a = report_in(folder / "a.report.json"), b = report_in(folder / "b.report.json");
+  EXPECT_NEAR(a["solid"]["volume_mm3"].get<double>(), b["solid"]["volume_mm3"].get<double>(),
+              0.01 * a["solid"]["volume_mm3"].get<double>());
+}
+
+TEST(Generate, QuietPrintsNothing) {
+  const TempDir folder;
+  const Finished finished = run(generate(asset("torus"), {"--infill", "tcs", "-o", folder / "a.stl", "--quiet"}));
+  EXPECT_EQ(finished.out, "");
+  EXPECT_EQ(finished.err, "");
+}
+
+TEST(Generate, JsonLogIsOneObjectALineAndNeverFallsBack) {
+  const TempDir folder;
+  const Finished finished = run(generate(asset("torus"), {"--infill", "tcs", "-o", folder / "a.stl", "--log", "json"}));
+  std::istringstream lines(finished.err);
+  double last = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const json event = json::parse(line);
+    if (event["event"] != "progress") continue;
+    EXPECT_GE(event["fraction"].get<double>(), last);
+    last = event["fraction"];
+  }
+  EXPECT_EQ(last, 1.0);
+}
+
+TEST(Generate, AFullDiskLeavesNothing) {
+  const TempDir folder;
+  std::string command = "ulimit -f 16; exec \"$0\" \"$@\"";  // no file above 16 blocks: the mesh does not fit
+  std::vector<std::string> arguments{"-c", command, FIBROLITE_PROGRAM};
+  const auto options =
+      generate(asset("torus"), {"--infill", "tcs", "-o", folder / "a.vdb", "-o", folder / "a.stl", "--quiet"});
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  const Finished finished = run_program("/bin/sh", arguments);
+  EXPECT_EQ(finished.code, 7);
+  EXPECT_THAT(finished.err, StartsWith("fibrolite: error: "));
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
+// ---- being stopped
+
+/// A job of many seconds, stopped after `delay`.
+void expect_clean_stop(milliseconds delay, int signal) {
+  const TempDir folder;
+  Process process(FIBROLITE_PROGRAM, {"generate", asset("quadruped"), "--size", "200", "--voxel", "0.2", "-o",
+                                      folder / "a.stl", "-o", folder / "a.vdb", "--picture", folder / "a.png"});
+  std::this_thread::sleep_for(delay);
+  ASSERT_FALSE(process.ended()) << "too quick to be stopped: " << process.err();
+  const auto asked = std::chrono::steady_clock::now();
+  process.send(signal);
+  EXPECT_EQ(process.wait(), 130);
+  EXPECT_LT(std::chrono::steady_clock::now() - asked, milliseconds(2000)) << "stopped after " << delay.count() << " ms";
+  EXPECT_THAT(process.err(), StartsWith("fibrolite: error: cancelled"));
+  EXPECT_EQ(process.out(), "");
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
+TEST(Generate, CtrlCLeavesNothing) {
+  for (const int delay_ms : {300, 1500, 4000}) expect_clean_stop(milliseconds(delay_ms), SIGINT);
+}
+TEST(Generate, SoDoesBeingTerminated) { expect_clean_stop(milliseconds(1000), SIGTERM); }
+
+TEST(Generate, ASecondCtrlCEndsAtOnce) {
+  const TempDir folder;
+  Process process(FIBROLITE_PROGRAM,
+                  {"generate", asset("quadruped"), "--size", "200", "--voxel", "0.2", "-o", folder / "a.stl"});
+  std::this_thread::sleep_for(milliseconds(1000));
+  process.send(SIGINT);
+  std::this_thread::sleep_for(milliseconds(5));
+  process.send(SIGINT);
+  EXPECT_EQ(process.wait(), 130);
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
+// ---- the other commands
+
+TEST(Partition, PartsInColourAsGridsAndInTheReport) {
+  const TempDir folder;
+  const Finished finished =
+      run({"partition", asset("quadruped"), "--size", "100", "-o", folder / "p.ply", "-o", folder / "p.vdb"});
+  const json report = report_in(folder / "p.report.json");
+  ASSERT_GE(report["parts"].size(), 5U);  // a body and four legs at least
+  int columns = 0;
+  double volume = 0;
+  for (const json& part : report["parts"]) {
+    columns += part["kind"] == "column" ? 1 : 0;
+    volume += part["volume_mm3"].get<double>();
+    const Solid grid = read_vdb(folder / "p.vdb", "part_" + std::to_string(part["id"].get<int>()));
+    EXPECT_NEAR(grid.volume_mm3(), part["volume_mm3"].get<double>(), 0.05 * grid.volume_mm3());
+    EXPECT_TRUE(part["dominance"].is_null());  // nothing was loaded
+  }
+  EXPECT_GE(columns, 4);
+  EXPECT_NEAR(volume, report["model"]["volume_mm3"].get<double>(), 0.03 * volume);
+  EXPECT_THAT(content(folder / "p.ply").substr(0, 600), HasSubstr("red"));
+  EXPECT_THAT(finished.out, HasSubstr("column"));
+}
+
+TEST(Check, TellsAClosedMeshFromAnOpenOne) {
+  const TempDir folder;
+  write_mesh(folder / "closed.stl", cube(10));
+  write_mesh(folder / "open.stl", without_triangle(cube(10), 3));
+  const json closed = json::parse(run({"check", folder / "closed.stl"}).out);
+  const json open = json::parse(run({"check", folder / "open.stl"}).out);
+  EXPECT_EQ(closed["closed"], true);
+  EXPECT_NEAR(closed["volume_mm3"].get<double>(), 1000, 1e-9);
+  EXPECT_EQ(closed["mesh"]["boundary_edges"], 0);
+  EXPECT_EQ(closed["self_intersections"], 0);
+  EXPECT_EQ(open["closed"], false);
+  EXPECT_EQ(open["mesh"]["boundary_edges"], 3);
+  EXPECT_EQ(closed["size_mm"], json({10.0, 10.0, 10.0}));
+}
+
+}  // namespace
+}  // namespace fibrolite
