@@ -82,10 +82,10 @@ void generate(const GenerateOptions& options) {
   params.steps = options.steps.has_value();
   params.recipe.verify.up = direction(options.model.up);
   check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
-  Outputs outputs(options.targets(), options.model.path, options.run.overwrite);
 
   const ThreadLimit threads(options.run.threads);
   const Terminal terminal(options.run);
+  Outputs outputs(options.targets(), options.model.path, options.run.overwrite);
   const Context& context = terminal.context();
   Report report;
   report.command = "generate";

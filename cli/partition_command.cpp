@@ -96,10 +96,10 @@ void run_partition(const PartitionOptions& options) {
   const Recipe recipe = options.recipe.load();
   std::vector<fs::path> targets = options.output.files;
   targets.push_back(options.output.report_path());
-  Outputs outputs(targets, options.model.path, options.run.overwrite);
 
   const ThreadLimit threads(options.run.threads);
   const Terminal terminal(options.run);
+  Outputs outputs(targets, options.model.path, options.run.overwrite);
   const Context& context = terminal.context();
   Report report;
   report.command = "partition";

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What the program must hold on real models: one line per requirement, with the number measured and ok or FAIL. Minutes
+// to run, so not a ctest:  acceptance MODELS_FOLDER [WORK_FOLDER [SECTION...]]
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "cli/run_program.h"
+#include "fibrolite/mesh_io.h"
+#include "fibrolite/ops/prepare.h"
+#include "fibrolite/ops/text.h"
+#include "fibrolite/winding.h"
+#include "mesh_checks.h"
+
+namespace {
+
+using namespace fibrolite;
+using namespace fibrolite::testing;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+struct Table {
+  fs::path models, work;
+  int failed = 0;
+
+  void row(const std::string& what, const std::string& measured, bool holds) {
+    std::printf("%-4s %-62s %s\n", holds ? "ok" : "FAIL", what.c_str(), measured.c_str());
+    std::fflush(stdout);
+    failed += holds ? 0 : 1;
+  }
+  void row(const std::string& what, double measured, double least, double most) {
+    row(what, number_text(measured) + "  (" + number_text(least) + " to " + number_text(most) + ")",
+        measured >= least && measured <= most);
+  }
+  void equal(const std::string& what, const json& measured, const json& wanted) {
+    row(what, measured.dump() + "  (" + wanted.dump() + ")", measured == wanted);
+  }
+
+  /// Runs `generate`, keeps WORK/NAME.stl and gives the report; empty if it failed.
+  json generate(const std::string& name, const fs::path& model, const std::vector<std::string>& options) {
+    std::vector<std::string> arguments{"generate", model, "-o", work / (name + ".stl"), "--overwrite", "--quiet"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Finished run = run_program(FIBROLITE_PROGRAM, arguments);
+    if (run.code != 0) {
+      row(name + ": exit code", std::to_string(run.code) + "  " + run.err.substr(0, run.err.find('\n')), false);
+      return {};
+    }
+    return json::parse(content(work / (name + ".report.json")));
+  }
+};
+
+double number(const json& value) { return value.get<double>(); }
+Vec3d vector(const json& list) { return {number(list[0]), number(list[1]), number(list[2])}; }
+
+std::vector<json> parts_of(const json& report, const char* kind) {
+  std::vector<json> parts;
+  for (const json& part : report["parts"])
+    if (part["kind"] == kind) parts.push_back(part);
+  return parts;
+}
+
+// ---- a solid that one can print
+
+/// PrusaSlicer's opinion, "key = value" a line; empty if it is not installed.
+std::map<std::string, std::string> slicer_info(const fs::path& mesh) {
+  if (!fs::exists("/usr/bin/prusa-slicer")) return {};
+  std::istringstream lines(run_program("/usr/bin/prusa-slicer", {"--info", mesh}).out);
+  std::map<std::string, std::string> info;
+  for (std::string line; std::getline(lines, line);)
+    if (const auto equals = line.find(" = "); equals != std::string::npos)
+      info[line.substr(0, equals)] = line.substr(equals + 3);
+  return info;
+}
+
+void check_slicer(Table& table, const std::string& name) {
+  auto info = slicer_info(table.work / (name + ".stl"));
+  if (info.empty()) return;
+  table.equal(name + ": slicer says manifold", info["manifold"], "yes");
+  for (const char* repair : {"facets_reversed", "open_edges", "degenerate_facets", "facets_removed"})
+    if (info.contains(repair)) table.equal(name + ": slicer counts " + repair, info[repair], "0");
+}
+
+void check_printable(Table& table, const std::string& name, const json& report) {
+  table.equal(name + ": pieces of material", report["solid"]["pieces"], 1);
+  std::int64_t defects = 0;
+  for (const char* defect : {"boundary_edges", "nonmanifold_edges", "nonmanifold_vertices", "degenerate_triangles"})
+    defects += report["mesh"][defect].get<std::int64_t>();
+  table.equal(name + ": mesh defects, by the report", defects, 0);
+  const IndependentCount counted = count(read_mesh(table.work / (name + ".stl")).mesh);
+  table.equal(
+      name + ": mesh defects, counted again on the file",
+      counted.boundary_edges + counted.nonmanifold_edges + counted.nonmanifold_vertices + counted.degenerate_triangles,
+      0);
+  table.row(name + ": mesh volume / grid volume", counted.volume_mm3 / number(report["solid"]["volume_mm3"]), 0.99,
+            1.01);
+  check_slicer(table, name);
+}
+
+/// How far the written mesh reaches outside the model, in voxels.
+void check_inside(Table& table, const std::string& name, const fs::path& model, double size_mm, double voxel_mm) {
+  const WindingTree tree(prepare(read_mesh(model), {.size_mm = size_mm, .unit_mm = {}}).mesh);
+  const Mesh made = read_mesh(table.work / (name + ".stl")).mesh;
+  const std::size_t step = std::max<std::size_t>(1, made.vertices.size() / 50000);
+  double farthest = 0;
+  for (std::size_t i = 0; i < made.vertices.size(); i += step) {
+    const Vec3d p = to_double(made.vertices[i]);
+    if (tree.winding(p) < 0.5) farthest = std::max(farthest, tree.nearest(p).distance_mm);
+  }
+  table.row(name + ": reaches outside the model, voxels", farthest / voxel_mm, 0, 0.5);
+}
+
+void models(Table& table) {
+  const std::set<std::string> clean{"armadillo.obj", "hand.obj", "spot.obj", "rocker-arm.obj", "fertility.off"};
+  for (const char* file : {"horse.ply", "armadillo.obj", "hand.obj", "spot.obj", "rocker-arm.obj", "fertility.off",
+                           "monkey.obj", "bunny-open.obj"}) {
+    for (const char* infill : {"hybrid", "tcs", "mfs", "solid"}) {
+      const std::string name = fs::path(file).stem().string() + "-" + infill;
+      const json report = table.generate(name, table.models / file, {"--size", "100", "--infill", infill});
+      if (report.is_null()) continue;
+      check_printable(table, name, report);
+      if (infill != std::string("solid"))
+        table.row(name + ": fill ratio", number(report["solid"]["fill_ratio"]), 0.1, 0.8);
+      if (clean.contains(file))
+        check_inside(table, name, table.models / file, 100, number(report["solid"]["voxel_mm"]));
+    }
+  }
+}
+
+// ---- the method
+
+void horse(Table& table) {
+  const json report = table.generate("horse300", table.models / "horse.ply",
+                                     {"--size", "300", "--voxel", "0.4", "--picture", table.work / "horse300.png"});
+  if (report.is_null()) return;
+  check_printable(table, "horse300", report);
+  // Legs: the four lowest columns. The model stands along the axis in which its columns run.
+  std::vector<json> legs = parts_of(report, "column");
+  int up = 0;
+  for (int axis = 1; axis < 3; ++axis) {
+    const auto along = [&](int k) {
+      double sum = 0;
+      for (const json& part : legs) sum += std::abs(number(part["axis"][static_cast<std::size_t>(k)]));
+      return sum;
+    };
+    if (along(axis) > along(up)) up = axis;
+  }
+  const auto height = [&](const json& part) { return number(part["centroid_mm"][static_cast<std::size_t>(up)]); };
+  std::sort(legs.begin(), legs.end(), [&](const json& a, const json& b) { return height(a) < height(b); });
+  table.row("horse300: columns", static_cast<double>(legs.size()), 4, 10);
+  legs.resize(std::min<std::size_t>(legs.size(), 4));
+  std::set<int> leg_ids, jointed;
+  for (const json& leg : legs) {
+    const std::string name = "horse300 leg " + leg["id"].dump();
+    leg_ids.insert(leg["id"].get<int>());
+    table.equal(name + ": infill", leg["infill"], "mfs");
+    table.row(name + ": material in its lumen", number(leg["infill_volume_mm3"]) / number(leg["lumen_mm3"]), 0.15, 1);
+    table.row(name + ": fibres in its middle section", number(leg["fibres"]), 7, 1e9);
+  }
+  const std::vector<json> bulk = parts_of(report, "bulk");
+  table.equal("horse300: bulk parts", bulk.size(), 1);
+  if (!bulk.empty()) table.equal("horse300: infill of the bulk", bulk.front()["infill"], "tcs");
+  for (const json& interface : report["interfaces"])
+    for (const json& id : interface["parts"])
+      if (leg_ids.contains(id.get<int>()) && interface["regions_after"] == 1) jointed.insert(id.get<int>());
+  table.equal("horse300: legs with a sound joint", jointed.size(), 4);
+  double wall_s = 0, judged_s = 0;
+  for (const json& stage : report["stages"]) {
+    wall_s += number(stage["wall_s"]);
+    if (std::set<std::string>{"proxy", "diameter", "partition", "verify"}.contains(stage["name"]))
+      judged_s += number(stage["wall_s"]);
+  }
+  std::printf("     horse300: %.1f s in all, %.1f s of it partition and verification\n", wall_s, judged_s);
+}
+
+void molar(Table& table) {
+  // The paper's box of 80 x 50 x 40 mm.
+  const fs::path file = table.work / "molar-box.ply";
+  Mesh mesh = read_mesh(asset("molar")).mesh;
+  const Vec3d size = bounds(mesh).size(), wanted{40, 50, 80};
+  for (Vec3f& v : mesh.vertices)
+    v = to_float({v.x * wanted.x / size.x, v.y * wanted.y / size.y, v.z * wanted.z / size.z});
+  write_mesh(file, mesh);
+  std::map<std::string, double> mass;
+  for (const char* infill : {"tcs", "hybrid", "mfs", "solid"}) {
+    const json report = table.generate(std::string("molar-") + infill, file, {"--infill", infill});
+    mass[infill] = report.is_null() ? std::nan("") : number(report["solid"]["mass_g"]);
+  }
+  const std::string masses = "tcs " + number_text(mass["tcs"], 4) + ", hybrid " + number_text(mass["hybrid"], 4) +
+                             ", mfs " + number_text(mass["mfs"], 4) + ", solid " + number_text(mass["solid"], 4) + " g";
+  table.row("molar: mass tcs < hybrid < mfs < solid", masses,
+            mass["tcs"] < mass["hybrid"] && mass["hybrid"] < mass["mfs"] && mass["mfs"] < mass["solid"]);
+  table.row("molar: hybrid / solid", mass["hybrid"] / mass["solid"], 0.30, 0.55);
+}
+
+/// The same parts: count, kinds, volumes; for each its worst volume ratio.
+void check_same_parts(Table& table, const std::string& name, const json& a, const json& b) {
+  table.equal(name + ": number of parts", b["parts"].size(), a["parts"].size());
+  if (a["parts"].size() != b["parts"].size()) return;
+  // A turned model may number its parts in another order: compare sorted by kind and volume.
+  const auto sorted = [](const json& report) {
+    std::vector<std::pair<std::string, double>> list;
+    for (const json& part : report["parts"]) list.emplace_back(part["kind"], number(part["volume_mm3"]));
+    std::sort(list.begin(), list.end());
+    return list;
+  };
+  const auto pa = sorted(a), pb = sorted(b);
+  double worst = 0;
+  std::string kinds_a, kinds_b;
+  for (std::size_t i = 0; i < pa.size(); ++i) {
+    worst = std::max(worst, std::abs(pb[i].second / pa[i].second - 1));
+    kinds_a += pa[i].first + " ";
+    kinds_b += pb[i].first + " ";
+  }
+  table.equal(name + ": kinds of parts", kinds_b, kinds_a);
+  table.row(name + ": worst difference of a part's volume", worst, 0, 0.01);
+}
+
+void voxels(Table& table) {
+  // At 0.5 mm the default sticks of 0.8 mm would be thinner than two voxels: both with 1 mm.
+  const std::vector<std::string> thick{"--size", "100",
+                                       "--set",  "tcs.stick_mm=1",
+                                       "--set",  "mfs.wall_mm=1",
+                                       "--set",  "joint.column_mm=1",
+                                       "--set",  "joint.min_wall_mm=1"};
+  const auto with_voxel = [&](const char* voxel) {
+    std::vector<std::string> options = thick;
+    options.insert(options.end(), {"--voxel", voxel});
+    return table.generate(std::string("quadruped-") + voxel, asset("quadruped"), options);
+  };
+  const json half = with_voxel("0.5"), eighth = with_voxel("0.125");
+  if (half.is_null() || eighth.is_null()) return;
+  check_same_parts(table, "quadruped at 0.5 and 0.125", half, eighth);
+  table.equal("quadruped at 0.5 and 0.125: joints", eighth["interfaces"].size(), half["interfaces"].size());
+  if (half["interfaces"].size() != eighth["interfaces"].size()) return;
+  double moved = 0;
+  bool same_columns = true;
+  for (std::size_t i = 0; i < half["interfaces"].size(); ++i) {
+    const json &a = half["interfaces"][i], &b = eighth["interfaces"][i];
+    moved = std::max(moved, norm(vector(a["centroid_mm"]) - vector(b["centroid_mm"])));
+    same_columns = same_columns && a["columns"] == b["columns"];
+  }
+  table.row("quadruped at 0.5 and 0.125: joints moved, mm", moved, 0, 1e-6);
+  table.row("quadruped at 0.5 and 0.125: as many columns at each joint", same_columns ? "yes" : "no", same_columns);
+}
+
+void load(Table& table) {
+  const json once = table.generate("cylinder", asset("cylinder_on_box"), {"--size", "60"});
+  const json tenfold =
+      table.generate("cylinder-10", asset("cylinder_on_box"), {"--size", "60", "--set", "verify.load_n=10000"});
+  if (once.is_null() || tenfold.is_null()) return;
+  table.equal("cylinder on box: columns under axial load", parts_of(once, "column").size(), 1);
+  check_same_parts(table, "cylinder on box, force x 10", once, tenfold);
+}
+
+void turned_models(Table& table) {
+  const Mesh mesh = prepare(read_mesh(asset("quadruped")), {.size_mm = 100, .unit_mm = {}}).mesh;
+  const fs::path straight = table.work / "straight.ply";
+  write_mesh(straight, mesh);
+  const json upright = table.generate("upright", straight, {});
+  if (upright.is_null()) return;
+  const char* names[3] = {"x", "y", "z"};
+  for (int axis = 0; axis < 3; ++axis) {
+    const fs::path file = table.work / "turned.ply";
+    write_mesh(file, turned(mesh, axis, 1));
+    Mesh up;  // where z goes
+    up.vertices = {{0, 0, 1}};
+    const Vec3f z = turned(up, axis, 1).vertices.front();
+    const float part[3] = {z.x, z.y, z.z};
+    std::string direction;
+    for (int k = 0; k < 3; ++k)
+      if (std::abs(part[k]) > 0.5F) direction = std::string(part[k] < 0 ? "-" : "") + names[k];
+    const std::string name = std::string("turned about ") + names[axis];
+    const json report = table.generate(std::string("turned-") + names[axis], file, {"--up", direction});
+    if (report.is_null()) continue;
+    check_same_parts(table, name, upright, report);
+    table.row(name + ": volume of the solid / upright",
+              number(report["solid"]["volume_mm3"]) / number(upright["solid"]["volume_mm3"]), 0.99, 1.01);
+  }
+}
+
+void shapes(Table& table) {
+  for (const char* name : {"torus", "y", "bent_tube", "figure", "bracket", "molar"}) {
+    const json report =
+        table.generate(name, asset(name), {"--size", "100", "--picture", table.work / (std::string(name) + ".png")});
+    if (report.is_null()) continue;
+    check_printable(table, name, report);
+    std::string parts;
+    for (const json& part : report["parts"])
+      parts += part["kind"].get<std::string>() + " " + number_text(number(part["volume_mm3"]), 3) + "; ";
+    std::printf("     %s: %s\n", name, parts.c_str());
+    for (const json& interface : report["interfaces"]) {
+      const std::string joint = std::string(name) + " joint " + interface["parts"].dump();
+      table.equal(joint + ": regions of the layer", interface["regions_after"], 1);
+      table.row(joint + ": layer / (union + bridges)",
+                number(interface["layer_area_mm2"]) /
+                    (number(interface["union_area_mm2"]) + number(interface["bridge_area_mm2"])),
+                0.75, 1.25);
+    }
+  }
+}
+
+void threads(Table& table) {
+  for (const char* count : {"1", "2"})
+    table.generate(std::string("threads-") + count, table.models / "armadillo.obj",
+                   {"--size", "100", "--threads", count, "-o", table.work / (std::string("threads-") + count + ".3mf"),
+                    "-o", table.work / (std::string("threads-") + count + ".vdb")});
+  for (const char* ending : {".stl", ".3mf", ".vdb"}) {
+    const std::string one = content(table.work / (std::string("threads-1") + ending));
+    const bool same = !one.empty() && one == content(table.work / (std::string("threads-2") + ending));
+    table.row(std::string("armadillo on 1 and 2 threads: ") + ending, same ? "same bytes" : "differ", same);
+  }
+  const auto measured = [&](const char* count) {
+    json report = json::parse(content(table.work / (std::string("threads-") + count + ".report.json")), nullptr, false);
+    report.erase("stages");
+    report.erase("threads");
+    return report.dump();
+  };
+  const bool same = measured("1") == measured("2");
+  table.row("armadillo on 1 and 2 threads: report", same ? "same" : "differs", same);
+}
+
+const std::vector<std::pair<std::string, std::function<void(Table&)>>> sections{
+    {"horse", horse}, {"models", models},        {"molar", molar},   {"voxels", voxels},
+    {"load", load},   {"turned", turned_models}, {"shapes", shapes}, {"threads", threads}};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::printf("acceptance MODELS_FOLDER [WORK_FOLDER [SECTION...]]\nsections:");
+    for (const auto& [name, check] : sections) std::printf(" %s", name.c_str());
+    std::printf("\n");
+    return 2;
+  }
+  Table table{argv[1], argc > 2 ? fs::path(argv[2]) : fs::temp_directory_path() / "fibrolite-acceptance"};
+  fs::create_directories(table.work);
+  const std::set<std::string> wanted(argv + std::min(argc, 3), argv + argc);
+  for (const auto& [name, check] : sections)
+    if (wanted.empty() || wanted.contains(name)) check(table);
+  std::printf("%d requirement%s failed\n", table.failed, table.failed == 1 ? "" : "s");
+  return table.failed == 0 ? 0 : 1;
+}
