@@ -1,1 +1,179 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "fibrolite/error.h"
+#include "models.h"
+
+namespace fibrolite {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::TempDir;
+
+std::string content(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::ptrdiff_t files_in(const fs::path& folder) {
+  return std::distance(fs::directory_iterator(folder), fs::directory_iterator{});
+}
+
+Error error_of(const auto& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error;
+  }
+  ADD_FAILURE() << "no error";
+  return Error(Code::Internal, "no error");
+}
+
+TEST(OutputFile, appears_only_when_committed) {
+  const TempDir dir;
+  OutputFile file(dir / "out.txt");
+  file.write("one ");
+  file.write(std::string(3 << 20, 'x'));  // longer than the buffer
+  file.write(" two");
+  EXPECT_FALSE(fs::exists(dir / "out.txt"));
+  file.commit();
+  EXPECT_EQ(content(dir / "out.txt"), "one " + std::string(3 << 20, 'x') + " two");
+  EXPECT_EQ(files_in(dir.path()), 1);
+}
+
+TEST(OutputFile, leaves_nothing_when_destroyed_uncommitted) {
+  const TempDir dir;
+  std::ofstream(dir / "out.txt") << "old";
+  {
+    OutputFile file(dir / "out.txt");
+    file.write("new");
+    EXPECT_EQ(files_in(dir.path()), 2);
+  }
+  EXPECT_EQ(content(dir / "out.txt"), "old");
+  EXPECT_EQ(files_in(dir.path()), 1);
+}
+
+TEST(OutputFile, replaces_an_existing_file) {
+  const TempDir dir;
+  std::ofstream(dir / "out.txt") << "a longer old text";
+  OutputFile file(dir / "out.txt");
+  file.write("new");
+  file.commit();
+  EXPECT_EQ(content(dir / "out.txt"), "new");
+}
+
+TEST(OutputFile, writes_through_a_link) {
+  const TempDir dir;
+  std::ofstream(dir / "real.txt") << "old";
+  fs::create_symlink(dir / "real.txt", dir / "link.txt");
+  OutputFile file(dir / "link.txt");
+  file.write("new");
+  file.commit();
+  EXPECT_TRUE(fs::is_symlink(dir / "link.txt"));
+  EXPECT_EQ(content(dir / "real.txt"), "new");
+}
+
+TEST(OutputFile, obeys_the_mask_of_the_process) {
+  const TempDir dir;
+  const mode_t before = umask(027);
+  OutputFile file(dir / "out.txt");
+  file.commit();
+  umask(before);
+  struct stat status {};
+  ASSERT_EQ(stat((dir / "out.txt").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0640U);
+}
+
+TEST(OutputFile, overwrites_bytes_in_place) {
+  const TempDir dir;
+  OutputFile file(dir / "out.txt");
+  file.write("0123456789");
+  const std::array bytes{std::byte{'a'}, std::byte{'b'}};
+  file.overwrite(3, bytes);
+  file.write("!");
+  file.commit();
+  EXPECT_EQ(content(dir / "out.txt"), "012ab56789!");
+}
+
+TEST(OutputFile, names_a_missing_folder) {
+  const TempDir dir;
+  const Error error = error_of([&] { OutputFile(dir.path() / "nowhere" / "out.txt"); });
+  EXPECT_EQ(error.code(), Code::Io);
+  EXPECT_THAT(error.what(), HasSubstr("nowhere"));
+}
+
+TEST(OutputFile, refuses_a_folder_and_a_device) {
+  const TempDir dir;
+  EXPECT_EQ(error_of([&] { OutputFile(dir.path()); }).code(), Code::Io);
+  fs::create_symlink("/dev/full", dir / "out.txt");
+  EXPECT_EQ(error_of([&] { OutputFile(dir / "out.txt"); }).code(), Code::Io);
+  EXPECT_EQ(files_in(dir.path()), 1);
+}
+
+TEST(OutputFile, refuses_a_folder_without_write_permission) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
+  const TempDir dir;
+  fs::create_directory(dir / "locked");
+  fs::permissions(dir / "locked", fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_EQ(error_of([&] { OutputFile(dir.path() / "locked" / "out.txt"); }).code(), Code::Io);
+}
+
+TEST(OutputFile, discarding_removes_what_is_uncommitted_and_stops_its_commit) {
+  const TempDir dir;
+  OutputFile done(dir / "done.txt");
+  done.commit();
+  OutputFile file(dir / "out.txt");
+  OutputFile other(dir / "other.txt");
+  file.write("text");
+  discard_uncommitted_files();
+  EXPECT_EQ(files_in(dir.path()), 1);
+  EXPECT_EQ(error_of([&] { file.commit(); }).code(), Code::Cancelled);
+  EXPECT_EQ(files_in(dir.path()), 1);
+}
+
+// A file system of 64 KiB.
+class SmallDisk : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (mount("none", dir_.path().c_str(), "tmpfs", 0, "size=64k") != 0)
+      GTEST_SKIP() << "a small file system cannot be mounted here";
+    mounted_ = true;
+  }
+  void TearDown() override {
+    if (mounted_) umount(dir_.path().c_str());
+  }
+  TempDir dir_;
+
+ private:
+  bool mounted_ = false;
+};
+
+TEST_F(SmallDisk, a_full_disk_is_an_error_and_keeps_the_old_file) {
+  std::ofstream(dir_ / "out.txt") << "old";
+  {
+    OutputFile file(dir_ / "out.txt");
+    const Error error = error_of([&] {
+      file.write(std::string(100'000, 'x'));
+      file.commit();
+    });
+    EXPECT_EQ(error.code(), Code::Io);
+    EXPECT_THAT(error.what(), HasSubstr("No space left"));
+  }
+  EXPECT_EQ(content(dir_ / "out.txt"), "old");
+  EXPECT_EQ(files_in(dir_.path()), 1);
+}
+
+}  // namespace
+}  // namespace fibrolite

@@ -17,8 +17,8 @@ enum class Up { X, Y, Z, MinusX, MinusY, MinusZ };
 [[nodiscard]] Vec3d direction(Up up);
 
 struct PrepareParams {
-  std::optional<double> size_mm;  ///< Scale so that the longest side has this length; > 0.
-  std::optional<double> unit_mm;  ///< Millimetres per file unit; > 0. Default: what the file says, else 1.
+  std::optional<double> size_mm{};  ///< Scale so that the longest side has this length; > 0.
+  std::optional<double> unit_mm{};  ///< Millimetres per file unit; > 0. Default: what the file says, else 1.
 };
 struct Model {
   Mesh mesh;                          ///< Welded, outward by signed volume, mm.
