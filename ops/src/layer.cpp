@@ -63,7 +63,14 @@ void drop_grazes(Layer& layer) {
   }
 }
 
-std::int64_t area_px(const Layer& layer) { return std::count(layer.solid.pixels.begin(), layer.solid.pixels.end(), 1); }
+/// Area of the layer inside the body, mm2. Pixels on an edge count in part, so that the raster's place does not matter.
+double area_mm2(const Layer& layer, const FloatImage& depth, const FloatImage& rim) {
+  double pixels = 0;
+  for (std::size_t i = 0; i < rim.pixels.size(); ++i)
+    if (rim.pixels[i] < -(rim_px - 1.5) * layer.pixel_mm)  // the section and the pixels around it
+      pixels += coverage(layer.distance_mm.pixels[i], layer.pixel_mm) * coverage(depth.pixels[i], layer.pixel_mm);
+  return pixels * layer.pixel_mm * layer.pixel_mm;
+}
 
 }  // namespace
 
@@ -89,12 +96,10 @@ Layer transient_layer(const Interface& interface, const Shape& fill_a, const Sha
     layer.solid.pixels[i] = section.pixels[i] != 0 && joined < 0;
   }
   drop_grazes(layer);
-  const double pixel_area = pixel_mm * pixel_mm;
-  const std::int64_t union_px = area_px(layer);
   layer.regions_before = regions(layer);
-  layer.union_area_mm2 = static_cast<double>(union_px) * pixel_area;
+  layer.union_area_mm2 = area_mm2(layer, depth, rim);
   join_regions(layer, section, params.bridge, params.min_wall_mm);
-  layer.bridge_area_mm2 = static_cast<double>(area_px(layer) - union_px) * pixel_area;
+  layer.bridge_area_mm2 = std::max(0.0, area_mm2(layer, depth, rim) - layer.union_area_mm2);
   layer.regions_after = regions(layer);
   // Bridges were drawn only that far around themselves: beyond, nothing larger may be claimed.
   const auto cap = static_cast<float>(Layer::cap_px * pixel_mm);

@@ -2,6 +2,7 @@
 // Shapes sampled on a plane. Private to ops.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -43,6 +44,11 @@ struct Regions {
   std::vector<std::int64_t> pixels;  ///< Of region i + 1.
 };
 [[nodiscard]] Regions regions_of(const Image<std::uint8_t>& mask);
+
+/// Share of a pixel that material covers, from the distance at its centre.
+[[nodiscard]] inline double coverage(double distance_mm, double pixel_mm) {
+  return std::clamp(0.5 - distance_mm / pixel_mm, 0.0, 1.0);
+}
 
 /// Bilinear value at pixel coordinates, clamped to the image.
 [[nodiscard]] inline float bilinear(const FloatImage& image, float x, float y) {

@@ -115,12 +115,15 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
   }
   // Where the crystal stands on the layer by itself.
   const PlaneGrid grid{frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height};
-  const FloatImage crystal_at_face = sample(crystal, grid, face);
+  const FloatImage crystal_at_face = sample(crystal, grid, face), lumen_at_face = sample(lumen, grid, face);
   std::vector<Vec2d> touching;
   for (int y = 0; y < grid.height; ++y)
     for (int x = 0; x < grid.width; ++x) {
+      if (layer.distance_mm(x, y) > grid.pixel_mm || crystal_at_face(x, y) > grid.pixel_mm) continue;
+      result.contact_area_mm2 += coverage(layer.distance_mm(x, y), grid.pixel_mm) *
+                                 coverage(crystal_at_face(x, y), grid.pixel_mm) *
+                                 coverage(lumen_at_face(x, y), grid.pixel_mm) * grid.pixel_mm * grid.pixel_mm;
       if (layer.solid(x, y) == 0 || crystal_at_face(x, y) >= 0) continue;
-      result.contact_area_mm2 += grid.pixel_mm * grid.pixel_mm;
       if (x % feet.stride == 0 && y % feet.stride == 0) touching.push_back(grid.local(x, y));
     }
 

@@ -13,7 +13,7 @@ namespace fibrolite {
 struct SupportColumns {
   std::vector<Capsule> columns;
   int dropped = 0;
-  double contact_area_mm2 = 0;  ///< Crystal in the layer's face, and the columns' feet.
+  double contact_area_mm2 = 0;  ///< Crystal in the layer's face inside the lumen, and the columns' feet.
 };
 /// Columns from `layer` along `frame`.z into `crystal`: its material within half of reach_mm is projected on the layer,
 /// feet are drawn as Poisson disks from where both are solid, each column ends where the crystal is stick_mm / 4 deep.

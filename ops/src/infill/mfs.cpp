@@ -109,7 +109,7 @@ LumenSection lumen_section(const Shape& lumen, const Frame& frame, const Extent&
   LumenSection section;
   section.grid.frame = frame;
   section.grid.corner_mm = extent.min;
-  section.grid.pixel_mm = std::max(pixel_mm, std::max(size.x, size.y) / section_side_px);
+  section.grid.pixel_mm = std::max(pixel_mm / 8, std::max(size.x, size.y) / section_side_px);
   section.grid.width = static_cast<int>(std::ceil(size.x / section.grid.pixel_mm)) + 1;
   section.grid.height = static_cast<int>(std::ceil(size.y / section.grid.pixel_mm)) + 1;
   section.value = sample(lumen, section.grid);
@@ -120,8 +120,7 @@ LumenSection lumen_section(const Shape& lumen, const Frame& frame, const Extent&
   cv::distanceTransform(mask, depth, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   double deepest_px = 0;
   cv::minMaxLoc(depth, nullptr, &deepest_px);
-  // Depth counts to the first pixel outside; the border lies half a pixel before it.
-  section.inscribed_mm = std::max(0.0, deepest_px - 0.5) * section.grid.pixel_mm;
+  section.inscribed_mm = deepest_px * section.grid.pixel_mm;
   return section;
 }
 

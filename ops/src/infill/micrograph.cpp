@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <span>
@@ -37,8 +39,9 @@ cv::Mat even_light(const GrayImage& micrograph) {
   cv::Mat flat;
   cv::divide(value, light, flat, 128);
   flat.convertTo(gray, CV_8U);
-  cv::medianBlur(gray, gray, 5);
-  cv::GaussianBlur(gray, gray, {5, 5}, 1.0);
+  // No stronger: a membrane may be two pixels wide.
+  cv::medianBlur(gray, gray, 3);
+  cv::GaussianBlur(gray, gray, {3, 3}, 0.7);
   return gray;
 }
 
@@ -177,14 +180,20 @@ FibreMap find_fibres(const GrayImage& micrograph) {
 }
 
 GrayImage read_gray(const std::filesystem::path& path) {
-  const std::string hint = "give a .png, .jpg, .tif or .bmp image";
+  const auto refuse = [&](const std::string& why) {
+    throw Error(Code::BadInput, "cannot read image" + why, path.string(), "give a .png, .jpg, .tif or .bmp image");
+  };
+  // Not cv::imread: it prints when a file is missing.
+  std::ifstream file(path, std::ios::binary);
+  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (bytes.empty()) refuse("");
   cv::Mat image;
   try {
-    image = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
+    image = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
   } catch (const cv::Exception& e) {
-    throw Error(Code::BadInput, "cannot read image: " + e.err, path.string(), hint);
+    refuse(": " + e.err);
   }
-  if (image.empty()) throw Error(Code::BadInput, "cannot read image", path.string(), hint);
+  if (image.empty()) refuse("");
   GrayImage gray(image.cols, image.rows);
   for (int y = 0; y < image.rows; ++y) std::copy_n(image.ptr<std::uint8_t>(y), image.cols, &gray(0, y));
   return gray;

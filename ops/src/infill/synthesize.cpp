@@ -13,6 +13,7 @@
 #include "infill/cells.h"
 #include "infill/network.h"
 #include "infill/quilt.h"
+#include "plane_image.h"
 
 namespace fibrolite {
 namespace {
@@ -84,6 +85,21 @@ LabelImage find_cells(const GrayImage& quilted, double least_inscribed_px, int& 
   return std::move(found.label);
 }
 
+/// A neck in a cell parts a pocket from its void. Pockets too small to keep become membrane: their distance is mirrored
+/// at zero, which keeps it 1-Lipschitz and its magnitude at most the distance.
+void fill_pockets(FloatImage& distance, double least_depth_mm) {
+  Image<std::uint8_t> mask(distance.width, distance.height);
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i) mask.pixels[i] = distance.pixels[i] > 0;
+  const Regions voids = regions_of(mask);
+  std::vector<float> depth(static_cast<std::size_t>(voids.count), 0);
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i)
+    if (const int v = voids.label.pixels[i]; v > 0)
+      depth[static_cast<std::size_t>(v - 1)] = std::max(depth[static_cast<std::size_t>(v - 1)], distance.pixels[i]);
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i)
+    if (const int v = voids.label.pixels[i]; v > 0 && depth[static_cast<std::size_t>(v - 1)] < least_depth_mm)
+      distance.pixels[i] = -std::max(distance.pixels[i], 1e-4F);
+}
+
 }  // namespace
 
 MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) {
@@ -119,6 +135,7 @@ MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) {
   result.distance_mm =
       distance_to_segments(borders, corner, params.pixel_mm, width, height, half_wall + 0.5 * params.fibre_mm);
   for (float& d : result.distance_mm.pixels) d -= static_cast<float>(half_wall);
+  fill_pockets(result.distance_mm, 0.8 * least_void * params.fibre_mm);
   return result;
 }
 

@@ -1,1 +1,320 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/infill/micrograph.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "fibrolite/error.h"
+#include "fibrolite/random.h"
+#include "generator.h"
+#include "models.h"
+
+namespace fibrolite {
+namespace {
+
+GrayImage inverted(GrayImage image) {
+  for (std::uint8_t& p : image.pixels) p = static_cast<std::uint8_t>(255 - p);
+  return image;
+}
+
+GrayImage halved(const GrayImage& image) {
+  GrayImage half(image.width / 2, image.height / 2);
+  for (int y = 0; y < half.height; ++y)
+    for (int x = 0; x < half.width; ++x)
+      half(x, y) = static_cast<std::uint8_t>(
+          (image(2 * x, 2 * y) + image(2 * x + 1, 2 * y) + image(2 * x, 2 * y + 1) + image(2 * x + 1, 2 * y + 1)) / 4);
+  return half;
+}
+
+const GrayImage& muscle() {
+  static const GrayImage image = read_gray(bundled_micrograph());
+  return image;
+}
+
+/// columns x rows square fibres of `pitch` pixels with membranes `wall` wide, half a pitch of membrane around them all.
+GrayImage square_fibres(int columns, int rows, int pitch, int wall) {
+  GrayImage image((columns + 1) * pitch, (rows + 1) * pitch, 60);
+  for (int y = 0; y < rows * pitch; ++y)
+    for (int x = 0; x < columns * pitch; ++x)
+      if (x % pitch >= wall && y % pitch >= wall) image(x + pitch / 2, y + pitch / 2) = 180;
+  return image;
+}
+
+TEST(Micrograph, CountsSquaresThatWereDrawn) {
+  const FibreMap map = find_fibres(square_fibres(9, 7, 26, 5));
+  EXPECT_EQ(map.fibres, 63);
+  EXPECT_NEAR(map.mean_pitch_px, 26, 0.3);  // squares share sides with four neighbours, one pitch away
+}
+
+TEST(Micrograph, EachDrawnSquareIsOneLabelOfItsOwn) {
+  const FibreMap map = find_fibres(square_fibres(9, 7, 26, 5));
+  std::set<int> seen;
+  for (int row = 0; row < 7; ++row)
+    for (int column = 0; column < 9; ++column) seen.insert(map.label(13 + column * 26 + 15, 13 + row * 26 + 15));
+  EXPECT_EQ(seen.size(), 63U);
+  EXPECT_FALSE(seen.contains(0));
+  EXPECT_EQ(map.label(13 + 26 + 2, 13 + 40), 0) << "the middle of a membrane";
+}
+
+TEST(Micrograph, BundledTextureIsWhatTheGeneratorDraws) {
+  const GrayImage drawn = muscle_micrograph(muscle_seed);
+  ASSERT_EQ(muscle().width, drawn.width);
+  ASSERT_EQ(muscle().height, drawn.height);
+  int different = 0;
+  for (std::size_t i = 0; i < drawn.pixels.size(); ++i) different += std::abs(muscle().pixels[i] - drawn.pixels[i]) > 1;
+  EXPECT_EQ(different, 0);
+}
+
+TEST(Micrograph, FindsTheFibresThatWereDrawn) {
+  const int drawn = muscle_fibre_count(muscle_seed);
+  const FibreMap map = find_fibres(muscle());
+  EXPECT_NEAR(map.fibres, drawn, 0.1 * drawn);
+  EXPECT_NEAR(map.mean_pitch_px, 42, 4.2) << "the generator's pitch";
+}
+
+TEST(Micrograph, DarkFibresAreFoundAsWell) {
+  const int bright = find_fibres(muscle()).fibres;
+  EXPECT_NEAR(find_fibres(inverted(muscle())).fibres, bright, 0.03 * bright);
+}
+
+TEST(Micrograph, HalfTheSizeGivesTheSameFibres) {
+  const FibreMap full = find_fibres(muscle()), half = find_fibres(halved(muscle()));
+  EXPECT_NEAR(half.fibres, full.fibres, 0.1 * full.fibres);
+  EXPECT_NEAR(half.mean_pitch_px, full.mean_pitch_px / 2, 0.06 * full.mean_pitch_px);
+}
+
+TEST(Micrograph, AnImageWithoutFibresIsRefused) {
+  const auto code = [](const GrayImage& image) {
+    try {
+      (void)find_fibres(image);
+    } catch (const Error& e) {
+      return e.code();
+    }
+    return Code::Internal;
+  };
+  EXPECT_EQ(code(GrayImage(200, 200, 128)), Code::BadInput);
+  EXPECT_EQ(code(GrayImage(5, 5, 1)), Code::BadInput);
+  EXPECT_EQ(code(GrayImage()), Code::BadInput);
+  GrayImage three(120, 40, 180);  // three fibres side by side are not enough to learn from
+  for (int y = 0; y < 40; ++y)
+    for (const int x : {38, 39, 40, 78, 79, 80}) three(x, y) = 60;
+  EXPECT_EQ(code(three), Code::BadInput);
+}
+
+TEST(Micrograph, AFileThatIsNoImageIsRefused) {
+  const testing::TempDir folder;
+  std::ofstream(folder / "a.png") << "not an image";
+  EXPECT_THROW((void)read_gray(folder / "a.png"), Error);
+  EXPECT_THROW((void)read_gray(folder / "missing.png"), Error);
+}
+
+TEST(Micrograph, GrayImagesSurviveTheFile) {
+  const testing::TempDir folder;
+  const GrayImage image = square_fibres(3, 2, 10, 3);
+  write_gray(folder / "b.png", image);
+  EXPECT_EQ(read_gray(folder / "b.png").pixels, image.pixels);
+}
+
+// --- synthesis
+// -----------------------------------------------------------------------------------------------------------------
+
+const FibreMap& muscle_map() {
+  static const FibreMap map = find_fibres(muscle());
+  return map;
+}
+
+MembraneImage membranes(double side_mm, std::uint64_t seed = 1, double fibre_mm = 2.4, double wall_mm = 0.8) {
+  MembraneParams params;
+  params.fibre_mm = fibre_mm;
+  params.wall_mm = wall_mm;
+  params.width_mm = params.height_mm = side_mm;
+  params.pixel_mm = std::min(0.1, wall_mm / 4);
+  params.seed = seed;
+  return synthesize(muscle_map(), params);
+}
+
+/// Voids as 4-connected regions: their pixel counts, and whether they touch the frame.
+struct Void {
+  int pixels = 0;
+  bool at_frame = false;
+  float deepest_mm = 0;
+};
+std::vector<Void> voids(const FloatImage& image) {
+  std::vector<Void> found;
+  Image<std::uint8_t> seen(image.width, image.height);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      if (seen(x, y) != 0 || image(x, y) <= 0) continue;
+      found.emplace_back();
+      std::vector<std::pair<int, int>> stack{{x, y}};
+      seen(x, y) = 1;
+      while (!stack.empty()) {
+        const auto [i, j] = stack.back();
+        stack.pop_back();
+        Void& v = found.back();
+        ++v.pixels;
+        v.deepest_mm = std::max(v.deepest_mm, image(i, j));
+        v.at_frame |= i == 0 || j == 0 || i + 1 == image.width || j + 1 == image.height;
+        for (const auto& [p, q] : {std::pair{i - 1, j}, std::pair{i + 1, j}, std::pair{i, j - 1}, std::pair{i, j + 1}})
+          if (p >= 0 && q >= 0 && p < image.width && q < image.height && seen(p, q) == 0 && image(p, q) > 0) {
+            seen(p, q) = 1;
+            stack.emplace_back(p, q);
+          }
+      }
+    }
+  return found;
+}
+
+TEST(Synthesize, HasTheSizeThatWasAsked) {
+  MembraneParams params;
+  params.width_mm = 12.34;
+  params.height_mm = 5.5;
+  const MembraneImage image = synthesize(muscle_map(), params);
+  EXPECT_GE(image.width_mm(), 12.34);
+  EXPECT_LT(image.width_mm(), 12.34 + 3 * params.pixel_mm);
+  EXPECT_GE(image.height_mm(), 5.5);
+}
+
+TEST(Synthesize, AsManyFibresAsThePitchSays) {
+  // Cells of a mean neighbour distance d cover about sqrt(3)/2 d^2 each; irregular ones up to a tenth more or less.
+  const MembraneImage image = membranes(40);
+  double whole = 0, cut = 0;
+  for (const Void& v : voids(image.distance_mm)) (v.at_frame ? cut : whole) += 1;
+  const double expected = image.width_mm() * image.height_mm() / (2.4 * 2.4 * std::sqrt(3.0) / 2);
+  EXPECT_NEAR(whole + cut / 2, expected, 0.15 * expected);
+}
+
+TEST(Synthesize, CellsAreClosedAndNoneIsTinyOrHuge) {
+  const double mean_cell_mm2 = 2.4 * 2.4 * std::sqrt(3.0) / 2;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const MembraneImage image = membranes(30, seed);
+    for (const Void& v : voids(image.distance_mm)) {
+      EXPECT_LT(v.pixels * 0.01, 5 * mean_cell_mm2) << "a leak joins cells";
+      if (!v.at_frame) {
+        EXPECT_GT(v.deepest_mm, 0.08 * 2.4) << "a void too small to keep";
+      }
+    }
+  }
+}
+
+TEST(Synthesize, EveryMembraneIsAtLeastTheWall) {
+  // Opening by a disc almost as wide as the wall must keep the membrane: independent of how the distance was made.
+  for (const double wall : {0.8, 0.4}) {
+    const MembraneImage image = membranes(16, 5, 2.4, wall);
+    const FloatImage& d = image.distance_mm;
+    const double radius_px = wall / 2 / image.pixel_mm - 0.75;
+    const int r = static_cast<int>(std::floor(radius_px));
+    std::vector<std::pair<int, int>> disc;
+    for (int j = -r; j <= r; ++j)
+      for (int i = -r; i <= r; ++i)
+        if (i * i + j * j <= radius_px * radius_px) disc.emplace_back(i, j);
+    Image<std::uint8_t> opened(d.width, d.height);
+    for (int y = r; y < d.height - r; ++y)
+      for (int x = r; x < d.width - r; ++x)
+        if (std::all_of(disc.begin(), disc.end(), [&](auto o) { return d(x + o.first, y + o.second) < 0; }))
+          for (const auto& [i, j] : disc) opened(x + i, y + j) = 1;
+    std::int64_t solid = 0, lost = 0;
+    for (int y = 2 * r; y < d.height - 2 * r; ++y)
+      for (int x = 2 * r; x < d.width - 2 * r; ++x)
+        if (d(x, y) < 0) {
+          ++solid;
+          lost += opened(x, y) == 0;
+        }
+    EXPECT_GT(solid, 1000);
+    EXPECT_LT(static_cast<double>(lost), 0.001 * static_cast<double>(solid)) << "wall " << wall;
+  }
+}
+
+TEST(Synthesize, DistanceIsLipschitz) {
+  const MembraneImage image = membranes(20);
+  const FloatImage& d = image.distance_mm;
+  const double p = image.pixel_mm, slack = 1e-4;
+  double worst_side = 0, worst_diagonal = 0;
+  for (int y = 0; y + 1 < d.height; ++y)
+    for (int x = 0; x + 1 < d.width; ++x) {
+      worst_side = std::max({worst_side, std::abs(d(x + 1, y) - d(x, y)) + 0.0, std::abs(d(x, y + 1) - d(x, y)) + 0.0});
+      worst_diagonal = std::max(worst_diagonal, std::abs(d(x + 1, y + 1) - d(x, y)) + 0.0);
+    }
+  EXPECT_LE(worst_side, p + slack);
+  EXPECT_LE(worst_diagonal, p * std::sqrt(2.0) + slack);
+}
+
+TEST(Synthesize, DistanceIsExactNearTheWall) {
+  // Brute force: the distance from a void pixel to the nearest sign change along a row or column crossing, sub-pixel.
+  const MembraneImage image = membranes(10);
+  const FloatImage& d = image.distance_mm;
+  std::vector<std::pair<double, double>> border;
+  for (int y = 0; y + 1 < d.height; ++y)
+    for (int x = 0; x + 1 < d.width; ++x) {
+      const double a = d(x, y), right = d(x + 1, y), down = d(x, y + 1);
+      if ((a < 0) != (right < 0)) border.emplace_back(x + a / (a - right), y);
+      if ((a < 0) != (down < 0)) border.emplace_back(x, y + a / (a - down));
+    }
+  double worst = 0;
+  for (int y = 20; y < d.height - 20; ++y)
+    for (int x = 20; x < d.width - 20; ++x) {
+      if (d(x, y) <= 0 || d(x, y) > 0.3) continue;
+      double nearest = 1e9;
+      for (const auto& [bx, by] : border) nearest = std::min(nearest, std::hypot(x - bx, y - by));
+      worst = std::max(worst, std::abs(nearest * image.pixel_mm - d(x, y)));
+    }
+  EXPECT_LT(worst, 0.35 * image.pixel_mm) << "border points are up to a pixel apart";
+}
+
+TEST(Synthesize, TheTextureDoesNotRepeat) {
+  // A tile would show as a shift at which the image meets itself.
+  const MembraneImage image = membranes(40);
+  const FloatImage& d = image.distance_mm;
+  double mean = 0;
+  for (const float v : d.pixels) mean += v;
+  mean /= static_cast<double>(d.pixels.size());
+  const auto correlation = [&](int dx, int dy) {
+    double ab = 0, aa = 0, bb = 0;
+    for (int y = 0; y + dy < d.height; y += 2)
+      for (int x = 0; x + dx < d.width; x += 2) {
+        const double a = d(x, y) - mean, b = d(x + dx, y + dy) - mean;
+        ab += a * b;
+        aa += a * a;
+        bb += b * b;
+      }
+    return ab / std::sqrt(aa * bb);
+  };
+  EXPECT_GT(correlation(1, 0), 0.9);
+  double worst = 0;
+  for (int shift = 48; shift < 200; ++shift) worst = std::max({worst, correlation(shift, 0), correlation(0, shift)});
+  EXPECT_LT(worst, 0.3);
+}
+
+TEST(Synthesize, SameSeedSameBitsOnAnyNumberOfThreads) {
+  const MembraneImage two = membranes(25, 7);
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  const MembraneImage one = membranes(25, 7);
+  EXPECT_EQ(one.distance_mm.pixels, two.distance_mm.pixels);
+  EXPECT_NE(membranes(25, 8).distance_mm.pixels, one.distance_mm.pixels);
+}
+
+TEST(Synthesize, RefusesWhatCannotBeMade) {
+  const auto code = [](auto change) {
+    MembraneParams params;
+    change(params);
+    try {
+      (void)synthesize(muscle_map(), params);
+    } catch (const Error& e) {
+      return e.code();
+    }
+    return Code::Internal;
+  };
+  EXPECT_EQ(code([](MembraneParams& p) { p.fibre_mm = 1.6; }), Code::BadRecipe);
+  EXPECT_EQ(code([](MembraneParams& p) { p.wall_mm = 0; }), Code::BadRecipe);
+  EXPECT_EQ(code([](MembraneParams& p) { p.wall_mm = std::nan(""); }), Code::BadRecipe);
+  EXPECT_EQ(code([](MembraneParams& p) { p.pixel_mm = 0.5; }), Code::BadRecipe);
+  EXPECT_EQ(code([](MembraneParams& p) { p.width_mm = 1e5; }), Code::TooLarge);
+}
+
+}  // namespace
+}  // namespace fibrolite

@@ -49,8 +49,9 @@ struct Joint {
   Shape shape;  ///< Layer and columns, unclipped by the body.
   Layer layer;
   std::vector<Capsule> columns;
-  int columns_dropped = 0;      ///< Found no crystal within reach.
-  double contact_area_mm2 = 0;  ///< Material of the layer that touches structure b (crystal), columns included.
+  int columns_dropped = 0;  ///< Found no crystal within reach.
+  double contact_area_mm2 =
+      0;  ///< Layer that touches the crystal (b's, if both are) inside the lumen, columns included.
   std::vector<std::string> warnings;
 };
 /// Support columns run along the interface's normal from the layer into each side's crystal (`crystal_a`, `crystal_b`:
