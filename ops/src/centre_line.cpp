@@ -8,7 +8,7 @@ namespace fibrolite {
 namespace {
 
 constexpr std::size_t least_samples = 12;  // in a level set
-constexpr std::size_t most_levels = 200;
+constexpr double most_levels = 300;
 
 struct Level {
   Vec3d centroid{};
@@ -16,13 +16,22 @@ struct Level {
   double width_mm = 0;
 };
 
-std::vector<Level> levels(const VoxelBody& body, const std::vector<std::int32_t>& order) {
-  const std::size_t count = std::clamp(order.size() / least_samples, std::size_t{1}, most_levels);
+// About one level per voxel of the way; each takes its neighbours in, since one layer of voxels is no section: it is a
+// staircase.
+std::vector<Level> levels(const VoxelBody& body, const std::vector<std::int32_t>& order, double way_mm, bool ring) {
+  const auto by_length = static_cast<std::size_t>(std::clamp(way_mm / body.voxel_mm, 1.0, most_levels));
+  const std::size_t count = std::max<std::size_t>(std::min(by_length, order.size() / least_samples), 1);
+  const std::size_t n = order.size();
   std::vector<Level> result(count);
   for (std::size_t l = 0; l < count; ++l) {
     Level& level = result[l];
-    level.first = l * order.size() / count;
-    level.last = (l + 1) * order.size() / count;
+    const std::size_t half = n / count;
+    const std::size_t from = l * n / count;
+    const std::size_t to = (l + 1) * n / count;
+    // The window shrinks evenly towards the ends of an open line, so that it stays centred.
+    const std::size_t grow = ring ? half : std::min({half, from, n - to});
+    level.first = from >= grow ? from - grow : 0;
+    level.last = std::min(to + grow, n);
     for (std::size_t i = level.first; i < level.last; ++i) level.centroid = level.centroid + body.position(order[i]);
     level.centroid = level.centroid / static_cast<double>(level.last - level.first);
   }
@@ -103,10 +112,11 @@ void measure_widths(const VoxelBody& body, const std::vector<std::int32_t>& orde
   }
 }
 
-double upper_quartile(const std::vector<Level>& list) {
+// The width that nine tenths of the levels keep below: a limb is as stout as its thickest stretch.
+double usual_width(const std::vector<Level>& list) {
   std::vector<double> widths;
   for (const Level& level : list) widths.push_back(level.width_mm);
-  const auto at = widths.begin() + static_cast<std::ptrdiff_t>(3 * widths.size() / 4);
+  const auto at = widths.begin() + static_cast<std::ptrdiff_t>(9 * widths.size() / 10);
   std::nth_element(widths.begin(), at, widths.end());
   return *at;
 }
@@ -128,13 +138,13 @@ Vec3d end_direction(const std::vector<Vec3d>& p, double over_mm) {
 
 }  // namespace
 
-CentreLine centre_line(const VoxelBody& body, const std::vector<std::int32_t>& order, bool ring, bool first_is_cut,
-                       bool second_is_cut) {
+CentreLine centre_line(const VoxelBody& body, const std::vector<std::int32_t>& order, double way_mm, bool ring,
+                       bool first_is_cut, bool second_is_cut) {
   CentreLine line;
-  std::vector<Level> list = levels(body, order);
+  std::vector<Level> list = levels(body, order, way_mm, ring);
   if (list.size() < 3) return line;
   measure_widths(body, order, list, ring);
-  line.width_mm = upper_quartile(list);
+  line.width_mm = usual_width(list);
 
   std::vector<Vec3d> p;
   for (const Level& level : list) p.push_back(level.centroid);
@@ -177,7 +187,7 @@ CentreLine centre_line(const VoxelBody& body, const std::vector<std::int32_t>& o
     line.points = resampled(p, pieces);
     return line;
   }
-  const double over = 0.5 * line.width_mm;
+  const double over = std::min(line.width_mm, 0.4 * length);
   const std::size_t tail = order.size() / 4 + 1;
   const Vec3d forward = end_direction(p, over);
   const double ahead = reach_beyond(body, order, order.size() - tail, order.size(), p.back(), forward);

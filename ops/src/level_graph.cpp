@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -134,18 +135,19 @@ std::vector<int> LevelGraph::arc(int junction, int next) const {
 
 LevelGraph make_level_graph(const VoxelBody& body, const Links& links, const LimbPiece& piece,
                             const std::vector<float>& level) {
-  const double bin = std::max(1.5 * body.voxel_mm, 0.25 * piece.diameter_mm);
+  // Wider than the longest step, so that no link skips a level set.
+  const double bin = std::max(2 * body.voxel_mm, 0.25 * piece.diameter_mm);
   const auto bin_of = [&](std::int32_t s) {
     return static_cast<int>(static_cast<double>(level[static_cast<std::size_t>(s)]) / bin);
   };
   LevelGraph graph;
-  std::map<std::int32_t, int> owner;
+  std::vector<int> owner(body.count(), -1);
   std::vector<std::int32_t> stack;
   for (const std::int32_t first : piece.samples) {
-    if (level[static_cast<std::size_t>(first)] < 0 || owner.contains(first)) continue;
+    if (level[static_cast<std::size_t>(first)] < 0 || owner[static_cast<std::size_t>(first)] >= 0) continue;
     const int id = static_cast<int>(graph.nodes.size());
     graph.nodes.emplace_back();
-    owner[first] = id;
+    owner[static_cast<std::size_t>(first)] = id;
     stack.push_back(first);
     while (!stack.empty()) {
       const std::int32_t s = stack.back();
@@ -154,22 +156,26 @@ LevelGraph make_level_graph(const VoxelBody& body, const Links& links, const Lim
       for (int d = 0; d < VoxelBody::directions; ++d) {
         if ((links[static_cast<std::size_t>(s)] >> static_cast<unsigned>(d) & 1U) == 0) continue;
         const std::int32_t n = body.neighbour(s, d);
-        if (level[static_cast<std::size_t>(n)] < 0 || bin_of(n) != bin_of(first) || owner.contains(n)) continue;
-        owner[n] = id;
+        if (level[static_cast<std::size_t>(n)] < 0 || bin_of(n) != bin_of(first) ||
+            owner[static_cast<std::size_t>(n)] >= 0)
+          continue;
+        owner[static_cast<std::size_t>(n)] = id;
         stack.push_back(n);
       }
     }
   }
-  for (const auto& [s, id] : owner) {
+  for (const std::int32_t s : piece.samples) {
+    const int id = owner[static_cast<std::size_t>(s)];
+    if (id < 0) continue;
     for (int d = 0; d < VoxelBody::directions; ++d) {
       if ((links[static_cast<std::size_t>(s)] >> static_cast<unsigned>(d) & 1U) == 0) continue;
-      const auto other = owner.find(body.neighbour(s, d));
-      if (other != owner.end() && other->second != id) node(graph, id).beside.insert(other->second);
+      const int other = owner[static_cast<std::size_t>(body.neighbour(s, d))];
+      if (other >= 0 && other != id) node(graph, id).beside.insert(other);
     }
   }
   for (const auto& face : piece.faces)
     for (const std::int32_t s : face)
-      if (const auto it = owner.find(s); it != owner.end()) node(graph, it->second).cut = true;
+      if (const int id = owner[static_cast<std::size_t>(s)]; id >= 0) node(graph, id).cut = true;
   const double sample_mm3 = body.voxel_mm * body.voxel_mm * body.voxel_mm;
   for (LevelNode& n : graph.nodes) {
     for (const std::int32_t s : n.samples) {
@@ -184,6 +190,36 @@ LevelGraph make_level_graph(const VoxelBody& body, const Links& links, const Lim
   while (merge_short_branch(graph, bin) || merge_small_hole(graph)) {
   }
   return graph;
+}
+
+std::int32_t farthest(const std::vector<std::int32_t>& samples, const std::vector<float>& distance) {
+  std::int32_t best = samples.front();
+  for (const std::int32_t s : samples)
+    if (distance[static_cast<std::size_t>(s)] > distance[static_cast<std::size_t>(best)]) best = s;
+  return best;
+}
+
+Tips sweep_tips(const VoxelBody& body, const Links& links, const std::vector<std::int32_t>& samples) {
+  // The sample nearest to the centroid: a start that turns with the model.
+  Vec3d centre{};
+  for (const std::int32_t s : samples) centre = centre + body.position(s);
+  centre = centre / static_cast<double>(samples.size());
+  std::int32_t start = samples.front();
+  for (const std::int32_t s : samples)
+    if (norm(body.position(s) - centre) < norm(body.position(start) - centre)) start = s;
+  const auto from = [&](std::int32_t s) { return geodesic(body, links, {s}, std::numeric_limits<double>::infinity()); };
+  Tips tips;
+  tips.from_first = from(farthest(samples, from(start)));
+  tips.from_second = from(farthest(samples, tips.from_first));
+  return tips;
+}
+
+LevelGraph level_graph_of(const VoxelBody& body, const Links& links, const LimbPiece& piece) {
+  std::vector<std::int32_t> cuts;
+  for (const auto& face : piece.faces) cuts.insert(cuts.end(), face.begin(), face.end());
+  return make_level_graph(body, links, piece,
+                          cuts.empty() ? sweep_tips(body, links, piece.samples).from_first
+                                       : geodesic(body, links, cuts, std::numeric_limits<double>::infinity()));
 }
 
 }  // namespace fibrolite

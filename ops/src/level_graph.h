@@ -35,5 +35,16 @@ struct LevelGraph {
 /// diameter merged.
 [[nodiscard]] LevelGraph make_level_graph(const VoxelBody& body, const Links& links, const LimbPiece& piece,
                                           const std::vector<float>& level);
+/// Of the distance from the piece's cuts, or from a tip if it has none.
+[[nodiscard]] LevelGraph level_graph_of(const VoxelBody& body, const Links& links, const LimbPiece& piece);
+
+/// Distances from the two ends of a piece, found by two sweeps.
+struct Tips {
+  std::vector<float> from_first, from_second;
+};
+[[nodiscard]] Tips sweep_tips(const VoxelBody& body, const Links& links, const std::vector<std::int32_t>& samples);
+
+/// The sample with the largest value.
+[[nodiscard]] std::int32_t farthest(const std::vector<std::int32_t>& samples, const std::vector<float>& distance);
 
 }  // namespace fibrolite

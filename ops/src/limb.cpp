@@ -18,13 +18,6 @@ namespace {
 
 constexpr double anywhere = std::numeric_limits<double>::infinity();
 
-std::int32_t farthest(const std::vector<std::int32_t>& samples, const std::vector<float>& distance) {
-  std::int32_t best = samples.front();
-  for (const std::int32_t s : samples)
-    if (distance[static_cast<std::size_t>(s)] > distance[static_cast<std::size_t>(best)]) best = s;
-  return best;
-}
-
 double largest(const std::vector<std::int32_t>& samples, const std::vector<float>& distance) {
   return static_cast<double>(distance[static_cast<std::size_t>(farthest(samples, distance))]);
 }
@@ -37,43 +30,6 @@ std::vector<std::int32_t> far_end(const std::vector<std::int32_t>& samples, cons
   for (const std::int32_t s : samples)
     if (static_cast<double>(distance[static_cast<std::size_t>(s)]) >= limit) end.push_back(s);
   return end;
-}
-
-// The sample nearest to the centroid: a start that turns with the model.
-std::int32_t central(const VoxelBody& body, const std::vector<std::int32_t>& samples) {
-  Vec3d centre{};
-  for (const std::int32_t s : samples) centre = centre + body.position(s);
-  centre = centre / static_cast<double>(samples.size());
-  std::int32_t best = samples.front();
-  for (const std::int32_t s : samples)
-    if (norm(body.position(s) - centre) < norm(body.position(best) - centre)) best = s;
-  return best;
-}
-
-struct Tips {
-  std::vector<float> from_first, from_second;
-};
-
-// The two ends of a piece without cuts, by two sweeps.
-Tips sweep_tips(const VoxelBody& body, const Links& links, const std::vector<std::int32_t>& samples) {
-  const auto from = [&](std::int32_t s) { return geodesic(body, links, {s}, anywhere); };
-  const std::int32_t first = farthest(samples, from(central(body, samples)));
-  Tips tips;
-  tips.from_first = from(first);
-  tips.from_second = from(farthest(samples, tips.from_first));
-  return tips;
-}
-
-std::vector<std::int32_t> all_faces(const LimbPiece& piece) {
-  std::vector<std::int32_t> all;
-  for (const auto& face : piece.faces) all.insert(all.end(), face.begin(), face.end());
-  return all;
-}
-
-LevelGraph graph_of(const VoxelBody& body, const Links& links, const LimbPiece& piece) {
-  const std::vector<float> level = piece.faces.empty() ? sweep_tips(body, links, piece.samples).from_first
-                                                       : geodesic(body, links, all_faces(piece), anywhere);
-  return make_level_graph(body, links, piece, level);
 }
 
 // Potential 0 on `zero`, 1 on `one`, harmonic between: its level sets stand square on the walls, so they cut a limb
@@ -173,6 +129,32 @@ Ends find_ends(const VoxelBody& body, const Links& links, const LimbPiece& piece
   return ends;
 }
 
+// The farthest samples of a flat tip lie at its rim, and a potential held there leans. Seen along the centre line the
+// tip is all that lies farthest ahead.
+void square_tips(const VoxelBody& body, const std::vector<std::int32_t>& samples, const CentreLine& line, Ends& ends) {
+  const std::vector<Vec3d>& p = line.points;
+  const std::size_t tail = p.size() / 3 + 1;
+  const auto cap = [&](Vec3d end, Vec3d outward, std::vector<std::int32_t>& set) {
+    // Only what is nearer to this end of the line than to its rest: a limb may bend back beside its own tip.
+    const double reach = line.width_mm;
+    double farthest = -anywhere;
+    std::vector<std::pair<double, std::int32_t>> ahead;
+    for (const std::int32_t s : samples) {
+      const Vec3d gap = body.position(s) - end;
+      const double along = dot(gap, outward);
+      if (norm(gap - along * outward) > reach || along < -line.width_mm) continue;
+      ahead.emplace_back(along, s);
+      farthest = std::max(farthest, along);
+    }
+    std::vector<std::int32_t> found;
+    for (const auto& [along, s] : ahead)
+      if (along >= farthest - 1.25 * body.voxel_mm) found.push_back(s);
+    if (!found.empty()) set = std::move(found);
+  };
+  if (!ends.first_is_cut) cap(p.front(), normalized(p.front() - p[tail]), ends.first);
+  if (!ends.second_is_cut) cap(p.back(), normalized(p.back() - p[p.size() - 1 - tail]), ends.second);
+}
+
 Ends ring_ends(const VoxelBody& body, const LevelGraph& graph, Links& links) {
   const std::vector<int> around = graph.alive();
   int thinnest = around.front();
@@ -200,64 +182,6 @@ std::vector<std::int32_t> by_value(const std::vector<std::int32_t>& samples, con
     return va != vb ? va < vb : a < b;
   });
   return order;
-}
-
-Vec3d outward(const LevelGraph& graph, const std::vector<int>& arc) {
-  const LevelNode& from = graph.nodes[static_cast<std::size_t>(arc.front())];
-  Vec3d best = graph.nodes[static_cast<std::size_t>(arc[1])].centroid - from.centroid;
-  for (std::size_t i = 1; i < arc.size(); ++i) {
-    const LevelNode& node = graph.nodes[static_cast<std::size_t>(arc[i])];
-    best = node.centroid - from.centroid;
-    if (norm(best) > 1.5 * node.diameter_mm) break;
-  }
-  return normalized(best);
-}
-
-double arc_diameter(const LevelGraph& graph, const std::vector<int>& arc) {
-  std::vector<double> d;
-  for (std::size_t i = 1; i < arc.size(); ++i) d.push_back(graph.nodes[static_cast<std::size_t>(arc[i])].diameter_mm);
-  std::nth_element(d.begin(), d.begin() + static_cast<std::ptrdiff_t>(d.size() / 2), d.end());
-  return d[d.size() / 2];
-}
-
-// Arcs that stay with the junction: two that run straight on into each other, else the thickest.
-std::vector<std::size_t> keepers(const std::vector<Vec3d>& direction, const std::vector<double>& diameter) {
-  constexpr double straight_on = -0.85;  // cosine between the outward directions
-  constexpr double alike = 1.5;
-  double best = straight_on;
-  std::vector<std::size_t> kept;
-  for (std::size_t a = 0; a < direction.size(); ++a) {
-    for (std::size_t b = a + 1; b < direction.size(); ++b) {
-      const double ratio = std::max(diameter[a], diameter[b]) / std::min(diameter[a], diameter[b]);
-      if (ratio > alike || dot(direction[a], direction[b]) >= best) continue;
-      best = dot(direction[a], direction[b]);
-      kept = {a, b};
-    }
-  }
-  if (kept.empty()) {
-    const auto thickest = std::max_element(diameter.begin(), diameter.end());
-    kept = {static_cast<std::size_t>(thickest - diameter.begin())};
-  }
-  return kept;
-}
-
-std::optional<Split> cut_off(const VoxelBody& body, const LevelGraph& graph, const std::vector<int>& arc) {
-  const LevelNode& junction = graph.nodes[static_cast<std::size_t>(arc.front())];
-  const double diameter = arc_diameter(graph, arc);
-  for (std::size_t i = 1; i < arc.size(); ++i) {
-    const LevelNode& node = graph.nodes[static_cast<std::size_t>(arc[i])];
-    const bool last = i + 1 == arc.size();
-    // The first place past the fork where the branch is no thicker than it is farther out.
-    if (!last && (node.diameter_mm > 1.25 * diameter || norm(node.centroid - junction.centroid) < 0.6 * diameter))
-      continue;
-    const LevelNode& before = graph.nodes[static_cast<std::size_t>(arc[i - 1])];
-    const Vec3d after = last ? node.centroid : graph.nodes[static_cast<std::size_t>(arc[i + 1])].centroid;
-    if (auto cut = cleanest_section(body, node.centroid, before.centroid - after, 0.65 * diameter,
-                                    node.centroid - junction.centroid)) {
-      return cut;
-    }
-  }
-  return std::nullopt;
 }
 
 }  // namespace
@@ -294,31 +218,10 @@ Axis principal_axis(const VoxelBody& body, const std::vector<std::int32_t>& samp
   return Axis::straight(centre + low * along, centre + high * along);
 }
 
-std::vector<Split> branch_cuts(const VoxelBody& body, const Links& links, const LimbPiece& piece) {
-  const LevelGraph graph = graph_of(body, links, piece);
-  std::vector<Split> cuts;
-  for (const int junction : graph.alive()) {
-    if (graph.degree(junction) < 3) continue;
-    std::vector<std::vector<int>> arcs;
-    std::vector<Vec3d> direction;
-    std::vector<double> diameter;
-    for (const int next : graph.nodes[static_cast<std::size_t>(junction)].beside) {
-      arcs.push_back(graph.arc(junction, next));
-      direction.push_back(outward(graph, arcs.back()));
-      diameter.push_back(arc_diameter(graph, arcs.back()));
-    }
-    const std::vector<std::size_t> kept = keepers(direction, diameter);
-    for (std::size_t a = 0; a < arcs.size(); ++a) {
-      if (std::find(kept.begin(), kept.end(), a) != kept.end()) continue;
-      if (auto cut = cut_off(body, graph, arcs[a])) cuts.push_back(std::move(*cut));
-    }
-  }
-  return cuts;
-}
-
-LimbShape limb_shape(const VoxelBody& body, const Links& links, const LimbPiece& piece, const Context& context) {
+LimbShape limb_shape(const VoxelBody& body, const Links& links, const LimbPiece& piece, double least_slenderness,
+                     const Context& context) {
   context.check();
-  const LevelGraph graph = graph_of(body, links, piece);
+  const LevelGraph graph = level_graph_of(body, links, piece);
   Links open = links;
   Ends ends;
   LimbShape shape;
@@ -328,12 +231,20 @@ LimbShape limb_shape(const VoxelBody& body, const Links& links, const LimbPiece&
   }
   if (!shape.ring) ends = find_ends(body, links, piece, graph);
   shape.free_ends = shape.ring ? 0 : (ends.first_is_cut ? 0 : 1) + (ends.second_is_cut ? 0 : 1);
-  const std::vector<double> u = harmonic(body, open, piece.samples, ends.first, ends.second);
-  const CentreLine line =
-      centre_line(body, by_value(piece.samples, u), shape.ring, ends.first_is_cut, ends.second_is_cut);
-  shape.length_mm = line.length_mm;
-  shape.width_mm = line.width_mm;
-  shape.axis = line.points.size() >= 2 ? Axis::along(line.points) : principal_axis(body, piece.samples);
+  const std::vector<float> way = geodesic(body, open, ends.first, anywhere);
+  const double way_mm = largest(piece.samples, way);
+  CentreLine line;
+  const auto follow = [&](const std::vector<double>& value) {
+    line = centre_line(body, by_value(piece.samples, value), way_mm, shape.ring, ends.first_is_cut, ends.second_is_cut);
+    shape.length_mm = line.length_mm;
+    shape.width_mm = line.width_mm;
+    shape.axis = line.points.size() >= 2 ? Axis::along(line.points) : principal_axis(body, piece.samples);
+  };
+  follow({way.begin(), way.end()});
+  // A stout piece is known as one by the geodesic alone; the harmonic potential costs most in just these.
+  if (line.points.size() < 2 || shape.slenderness() < 0.6 * least_slenderness) return shape;
+  if (!shape.ring) square_tips(body, piece.samples, line, ends);
+  follow(harmonic(body, open, piece.samples, ends.first, ends.second));
   return shape;
 }
 
@@ -341,7 +252,8 @@ double quick_slenderness(const VoxelBody& body, const Links& links, const LimbPi
   const std::vector<float> way = geodesic(body, links, piece.faces.front(), anywhere);
   const std::vector<double> value(way.begin(), way.end());
   const bool other_cut = piece.faces.size() > 1;
-  const CentreLine line = centre_line(body, by_value(piece.samples, value), false, true, other_cut);
+  const CentreLine line =
+      centre_line(body, by_value(piece.samples, value), largest(piece.samples, way), false, true, other_cut);
   return line.width_mm > 0 ? line.length_mm / line.width_mm - (other_cut ? 0 : 0.5) : 0;
 }
 

@@ -24,7 +24,7 @@ using Split = Section;
 struct LimbShape {
   Axis axis;
   double length_mm = 0;  ///< From cut or tip to cut or tip.
-  double width_mm = 0;   ///< Larger principal diameter of its sections, upper quartile.
+  double width_mm = 0;   ///< Larger principal diameter of its sections, 90th percentile.
   int free_ends = 0;     ///< Tips: 0 to 2.
   bool ring = false;
   /// Length over width, half a width per tip taken off: a ball has none, however it is measured.
@@ -34,11 +34,12 @@ struct LimbShape {
 /// Sections that part a branching piece into its limbs; empty if it is one limb (or a ring).
 [[nodiscard]] std::vector<Split> branch_cuts(const VoxelBody& body, const Links& links, const LimbPiece& piece);
 
-/// Centre line from the cut to the tip, cut to cut, tip to tip, or round a ring.
+/// Centre line from the cut to the tip, cut to cut, tip to tip, or round a ring. A piece that is clearly below
+/// `least_slenderness` gets its principal axis.
 [[nodiscard]] LimbShape limb_shape(const VoxelBody& body, const Links& links, const LimbPiece& piece,
-                                   const Context& context);
+                                   double least_slenderness, const Context& context);
 
-/// Slenderness from geodesic distances alone; quick.
+/// Slenderness from geodesic distances to its first cut alone; quick. The piece must have a cut.
 [[nodiscard]] double quick_slenderness(const VoxelBody& body, const Links& links, const LimbPiece& piece);
 
 /// A straight axis along the longest principal axis.

@@ -18,9 +18,12 @@ namespace {
 
 constexpr double sweep_from = 0.15;
 constexpr double sweep_step = 0.025;
-constexpr int sweep_count = 19;         // up to 0.60
-constexpr double same_overlap = 0.75;   // of a limb at one threshold with itself at the next
-constexpr double even_diameters = 1.5;  // 90th over 10th percentile: below this a threshold only sorts noise
+constexpr int sweep_count = 29;          // up to 0.85
+constexpr double same_next = 0.75;       // overlap of a limb at one threshold with itself at the next
+constexpr double same_over_range = 0.6;  // and with itself at the first threshold of the range
+constexpr double even_diameters = 1.5;   // 90th over 10th percentile: below this a threshold only sorts noise
+
+double threshold_at(std::size_t step) { return sweep_from + sweep_step * static_cast<double>(step); }
 
 void check_params(const PartitionParams& p) {
   const auto out_of = [](double v, double lo, double hi) { return !(v >= lo && v <= hi); };
@@ -55,8 +58,9 @@ double diameter_ratio(const Anatomy& anatomy) {
   return low > 0 ? percentile(0.9) / low : std::numeric_limits<double>::infinity();
 }
 
-// Do two partitions have the same limbs? One to one, each with most of its samples in common.
-bool same_limbs(const Limbs& a, const Limbs& b) {
+// Do two partitions have the same limbs? One to one, each sharing `overlap` of the samples of both (intersection over
+// union).
+bool same_limbs(const Limbs& a, const Limbs& b, double overlap) {
   if (a.count != b.count) return false;
   std::map<std::pair<int, int>, double> common;
   std::map<int, double> size_a;
@@ -72,7 +76,7 @@ bool same_limbs(const Limbs& a, const Limbs& b) {
   }
   int matched = 0;
   for (const auto& [pair, both] : common)
-    if (both >= same_overlap * (size_a[pair.first] + size_b[pair.second] - both)) ++matched;
+    if (both >= overlap * (size_a[pair.first] + size_b[pair.second] - both)) ++matched;
   return matched == a.count;
 }
 
@@ -87,30 +91,33 @@ Choice most_stable(const Anatomy& anatomy, const PartitionParams& params, const 
   std::vector<Limbs> sweep(sweep_count);
   tbb::parallel_for(0, sweep_count, [&](int i) {
     context.check();
-    sweep[static_cast<std::size_t>(i)] =
-        find_limbs(anatomy, sweep_from + i * sweep_step, params.min_area, params.min_slenderness);
+    Limbs& limbs = sweep[static_cast<std::size_t>(i)];
+    limbs = find_limbs(anatomy, threshold_at(static_cast<std::size_t>(i)), params.min_area, params.min_slenderness);
+    limbs.pieces.links = {};  // the chosen one is made again: many fine proxies would fill the memory
   });
   std::size_t best_first = 0;
   std::size_t best_last = 0;
   bool found = false;
-  for (std::size_t first = 0; first < sweep.size();) {
+  for (std::size_t first = 0; first < sweep.size(); ++first) {
+    if (sweep[first].count == 0) continue;
     std::size_t last = first;
-    while (last + 1 < sweep.size() && same_limbs(sweep[last], sweep[last + 1])) ++last;
+    while (last + 1 < sweep.size() && same_limbs(sweep[last], sweep[last + 1], same_next) &&
+           same_limbs(sweep[first], sweep[last + 1], same_over_range))
+      ++last;
     // Of two ranges of the same width the one with the higher thresholds has the larger limbs.
-    if (sweep[first].count > 0 && (!found || last - first >= best_last - best_first)) {
+    if (!found || last - first >= best_last - best_first) {
       found = true;
       best_first = first;
       best_last = last;
     }
-    first = last + 1;
   }
   Choice choice;
   if (!found) return choice;
   const std::size_t middle = (best_first + best_last + 1) / 2;
-  choice.limbs = std::move(sweep[middle]);
-  choice.threshold = sweep_from + sweep_step * static_cast<double>(middle);
-  choice.stable_from = sweep_from + sweep_step * static_cast<double>(best_first);
-  choice.stable_to = sweep_from + sweep_step * static_cast<double>(best_last);
+  choice.threshold = threshold_at(middle);
+  choice.stable_from = threshold_at(best_first);
+  choice.stable_to = threshold_at(best_last);
+  choice.limbs = find_limbs(anatomy, choice.threshold, params.min_area, params.min_slenderness);
   choice.found = true;
   return choice;
 }
@@ -149,6 +156,12 @@ std::vector<std::uint8_t> limb_pieces(const CutPieces& pieces, const std::vector
   return limb;
 }
 
+bool contains(const std::vector<Section>& list, const Section& cut) {
+  return std::any_of(list.begin(), list.end(), [&](const Section& other) {
+    return other.frame.origin == cut.frame.origin && other.frame.z == cut.frame.z;
+  });
+}
+
 // A branching limb is parted into its branches; a new piece too small or too stout to be a limb stays with its
 // neighbour.
 CutPieces split_branches(const Anatomy& anatomy, CutPieces pieces, const std::vector<std::uint8_t>& limb_sample,
@@ -175,9 +188,7 @@ CutPieces split_branches(const Anatomy& anatomy, CutPieces pieces, const std::ve
       // Which of the new cuts part off a piece that is too small?
       std::vector<Section> kept;
       for (std::size_t c = 0; c < next.cuts.size(); ++c) {
-        const bool old = std::any_of(before.begin(), before.end(), [&](const Section& b) {
-          return b.frame.origin == next.cuts[c].frame.origin && b.frame.z == next.cuts[c].frame.z;
-        });
+        const bool old = contains(before, next.cuts[c]);
         if (old) continue;
         const double smaller = std::min(share[static_cast<std::size_t>(next.sides[c][0])],
                                         share[static_cast<std::size_t>(next.sides[c][1])]);
@@ -200,18 +211,16 @@ struct Described {
   int piece = 0;
 };
 
-double piece_volume(const Anatomy& anatomy, const CutPieces& pieces, std::vector<double>& volume) {
+std::vector<double> piece_volumes(const Anatomy& anatomy, const CutPieces& pieces) {
   const VoxelBody& body = anatomy.body;
   const double sample = body.voxel_mm * body.voxel_mm * body.voxel_mm;
-  volume.assign(static_cast<std::size_t>(pieces.count), 0);
-  double all = 0;
+  std::vector<double> volume(static_cast<std::size_t>(pieces.count), 0);
   for (std::size_t at = 0; at < body.distance.size(); ++at) {
     const double share = std::clamp(0.5 - static_cast<double>(body.distance[at]) / body.voxel_mm, 0.0, 1.0);
-    if (share <= 0) continue;
-    volume[static_cast<std::size_t>(pieces.of[static_cast<std::size_t>(anatomy.nearest[at])])] += share * sample;
-    all += share * sample;
+    if (share > 0)
+      volume[static_cast<std::size_t>(pieces.of[static_cast<std::size_t>(anatomy.nearest[at])])] += share * sample;
   }
-  return all;
+  return volume;
 }
 
 Candidate describe(const Anatomy& anatomy, const CutPieces& pieces, int id, bool may_be_limb, double volume,
@@ -223,7 +232,7 @@ Candidate describe(const Anatomy& anatomy, const CutPieces& pieces, int id, bool
   for (const std::int32_t s : piece.samples) c.centroid_mm = c.centroid_mm + anatomy.body.position(s);
   c.centroid_mm = c.centroid_mm / static_cast<double>(piece.samples.size());
   if (may_be_limb) {
-    const LimbShape shape = limb_shape(anatomy.body, pieces.links, piece, context);
+    const LimbShape shape = limb_shape(anatomy.body, pieces.links, piece, params.min_slenderness, context);
     const double slenderness = shape.slenderness();
     c.column_like = slenderness >= params.min_slenderness;
     c.reason = std::string(shape.ring ? "a ring " : "a limb ") + number_text(shape.length_mm, 3) + " mm long and " +
@@ -240,6 +249,19 @@ Candidate describe(const Anatomy& anatomy, const CutPieces& pieces, int id, bool
   c.axis = principal_axis(anatomy.body, piece.samples);
   c.length_mm = c.axis.length_mm();
   return c;
+}
+
+std::vector<Described> describe_all(const Anatomy& anatomy, const CutPieces& pieces,
+                                    const std::vector<std::uint8_t>& limb_sample, const PartitionParams& params,
+                                    const Context& context) {
+  const std::vector<std::uint8_t> may_be_limb = limb_pieces(pieces, limb_sample);
+  const std::vector<double> volume = piece_volumes(anatomy, pieces);
+  std::vector<Described> described(static_cast<std::size_t>(pieces.count));
+  tbb::parallel_for(0, pieces.count, [&](int id) {
+    const auto i = static_cast<std::size_t>(id);
+    described[i] = {describe(anatomy, pieces, id, may_be_limb[i] != 0, volume[i], params, context), id};
+  });
+  return described;
 }
 
 }  // namespace
@@ -269,7 +291,7 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
     if (!choice.found) {
       choice = whole_body(anatomy);
       result.notes.push_back("no threshold from " + number_text(sweep_from) + " to " +
-                             number_text(sweep_from + sweep_step * (sweep_count - 1)) + " cuts off a limb");
+                             number_text(threshold_at(sweep_count - 1)) + " cuts off a limb");
     }
   }
   context.progress(0.6);
@@ -279,17 +301,22 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   result.notes.insert(result.notes.end(), choice.limbs.notes.begin(), choice.limbs.notes.end());
 
   const std::vector<std::uint8_t> limb_sample = limb_samples(choice.limbs);
-  const CutPieces pieces = split_branches(anatomy, std::move(choice.limbs.pieces), limb_sample, params, context);
-  const std::vector<std::uint8_t> may_be_limb = limb_pieces(pieces, limb_sample);
-  std::vector<double> volume;
-  piece_volume(anatomy, pieces, volume);
-  context.progress(0.7);
-
-  std::vector<Described> described(static_cast<std::size_t>(pieces.count));
-  tbb::parallel_for(0, pieces.count, [&](int id) {
-    const auto i = static_cast<std::size_t>(id);
-    described[i] = {describe(anatomy, pieces, id, may_be_limb[i] != 0, volume[i], params, context), id};
-  });
+  const std::vector<Section> by_threshold = choice.limbs.pieces.cuts;
+  CutPieces pieces = split_branches(anatomy, std::move(choice.limbs.pieces), limb_sample, params, context);
+  std::vector<Described> described = describe_all(anatomy, pieces, limb_sample, params, context);
+  for (;;) {
+    // A fork between lumps that no fibre could run through: parting them gains nothing.
+    std::vector<Section> kept;
+    for (std::size_t c = 0; c < pieces.cuts.size(); ++c) {
+      const bool column = described[static_cast<std::size_t>(pieces.sides[c][0])].candidate.column_like ||
+                          described[static_cast<std::size_t>(pieces.sides[c][1])].candidate.column_like;
+      if (column || contains(by_threshold, pieces.cuts[c])) kept.push_back(pieces.cuts[c]);
+    }
+    if (kept.size() == pieces.cuts.size()) break;
+    pieces = cut_body(anatomy, std::move(kept));
+    described = describe_all(anatomy, pieces, limb_sample, params, context);
+  }
+  context.progress(0.8);
   // Largest first: an order that turns with the model.
   std::sort(described.begin(), described.end(), [](const Described& a, const Described& b) {
     return a.candidate.volume_mm3 != b.candidate.volume_mm3 ? a.candidate.volume_mm3 > b.candidate.volume_mm3

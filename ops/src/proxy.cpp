@@ -47,8 +47,8 @@ Proxy make_proxy(const Mesh& model, const ProxyParams& params, const Context& co
   const double model_area = area(model);
   if (!(model_area > 0)) throw Error(Code::BadInput, "the model has no area", "proxy", "give a closed surface");
   const double least_voxel = coarsest_for(bounds(model));
-  // The dual surface of a level set has about two triangles per voxel face's worth of area.
-  double voxel = std::max(std::sqrt(2 * model_area / params.triangles), least_voxel);
+  // A surface crosses 1.5 lattice edges per square voxel on average; each gives two triangles.
+  double voxel = std::max(std::sqrt(3 * model_area / params.triangles), least_voxel);
   const double finest = std::max(voxel / std::sqrt(finest_share), least_voxel);
   for (int round = 0;; ++round) {
     context.check();

@@ -16,7 +16,7 @@ struct Proxy {
   Mesh surface;  ///< Its surface: closed, outward, about `triangles` faces.
 };
 struct ProxyParams {
-  int triangles = 30000;  ///< Aimed at; up to four times as many where thin limbs would be lost; 1000 to 200000.
+  int triangles = 40000;  ///< Aimed at; up to four times as many where thin limbs would be lost; 1000 to 200000.
 };
 /// The proxy voxel follows from the model's area alone, never from the fine voxel.
 /// @throws Error BadInput: no volume at the proxy's voxel.
