@@ -301,6 +301,9 @@ Eigen::MatrixXd cholesky_solve(const Sparse& matrix, const Eigen::MatrixXd& load
   openblas_set_num_threads(1);
   Eigen::CholmodSupernodalLLT<Sparse, Eigen::Lower> solver;
   solver.cholmod().print = 0;  // it would write its complaints to stdout
+  solver.cholmod().nmethods =
+      1;  // nested dissection wins on volume meshes: trying others first costs a third of the time
+  solver.cholmod().method[0].ordering = CHOLMOD_METIS;
   solver.compute(matrix);
   if (solver.info() != Eigen::Success) {
     throw Error(Code::SolverFailed, "the stiffness matrix is singular or does not fit the memory", "elasticity",

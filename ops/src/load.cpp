@@ -84,42 +84,37 @@ Footprint seen_from_above(const TetMesh& body, Vec3d up, const Support& support,
   return result;
 }
 
-std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint,
+std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint, double tolerance_mm,
                                  const std::function<bool(Vec3d)>& mine) {
-  // For each point the upward face nearest in height: a component's own surface differs a little from the body's.
+  constexpr std::size_t nobody = std::numeric_limits<std::size_t>::max();
   struct Hit {
-    double off = std::numeric_limits<double>::infinity();
-    std::size_t face = 0;
+    double height = 0;
+    double off;  // from the height of the point; `tolerance_mm` at first
+    std::size_t face = nobody;
     std::array<double, 3> barycentric{};
   };
-  constexpr std::uint32_t nobody = 0xffffffffU;
-  std::vector<std::uint32_t> wanted(
+  std::vector<std::size_t> wanted(
       static_cast<std::size_t>(footprint.width) * static_cast<std::size_t>(footprint.height), nobody);
-  std::vector<Footprint::Point> points;
+  std::vector<Hit> hits;
   for (const Footprint::Point& point : footprint.points) {
     if (!mine(footprint.at(point))) continue;
-    wanted[static_cast<std::size_t>(point.pixel)] = static_cast<std::uint32_t>(points.size());
-    points.push_back(point);
+    wanted[static_cast<std::size_t>(point.pixel)] = hits.size();
+    hits.push_back({point.height, tolerance_mm, nobody, {}});
   }
   const std::vector<TetFace> faces = boundary(mesh);
-  std::vector<Hit> hits(points.size());
   rasterize(mesh, faces, footprint, [&](std::size_t pixel, std::size_t face, const auto& barycentric, double height) {
-    const std::uint32_t point = wanted[pixel];
-    if (point == nobody) return;
-    const double off = std::abs(height - points[point].height);
-    if (off < hits[point].off) hits[point] = {off, face, barycentric};
+    if (wanted[pixel] == nobody) return;
+    Hit& hit = hits[wanted[pixel]];
+    const double off = std::abs(height - hit.height);
+    if (off < hit.off) hit = {hit.height, off, face, barycentric};
   });
   std::vector<double> shares(mesh.nodes.size(), 0.0);
-  double met = 0;
+  const double each = 1 / static_cast<double>(footprint.points.size());
   for (const Hit& hit : hits) {
-    if (!(hit.off < std::numeric_limits<double>::infinity())) continue;
+    if (hit.face == nobody) continue;
     const auto n = fem::face_shape_functions(hit.barycentric);
-    for (std::size_t k = 0; k < 6; ++k) shares[faces[hit.face].nodes[k]] += n[k];
-    ++met;
+    for (std::size_t k = 0; k < 6; ++k) shares[faces[hit.face].nodes[k]] += each * n[k];
   }
-  const double each =
-      met > 0 ? static_cast<double>(points.size()) / (met * static_cast<double>(footprint.points.size())) : 0;
-  for (double& share : shares) share *= each;
   return shares;
 }
 

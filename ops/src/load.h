@@ -38,9 +38,9 @@ struct Footprint {
                                         const std::optional<Box3d>& region);
 
 /// The share of the whole force on each node of `mesh` (of the body or of one component of it), from the points that
-/// `mine` accepts. Shares sum to (points accepted) / (all points), also if the mesh misses some of them; all zero if it
-/// misses all.
-[[nodiscard]] std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint,
+/// `mine` accepts. Each goes to the upward face above or below it that is nearest in height; farther than
+/// `tolerance_mm` is not met. Shares sum to (points met) / (all points): 1 for the body itself.
+[[nodiscard]] std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint, double tolerance_mm,
                                                const std::function<bool(Vec3d)>& mine);
 
 /// Unit directions of the two load cases: straight down, and 45 degrees from it, coming from `azimuth_deg` about `up`.

@@ -23,9 +23,6 @@
 namespace fibrolite {
 namespace {
 
-constexpr int body_triangles = 6000;
-constexpr int least_component_triangles = 1500, most_component_triangles = 4000;
-
 void check_params(const VerifyParams& p) {
   const auto require = [](bool holds, const char* key, const char* range) {
     if (!holds) throw Error(Code::BadRecipe, std::string("verify.") + key + " must be " + range, "recipe");
@@ -35,6 +32,7 @@ void check_params(const VerifyParams& p) {
   require(p.load_n > 0 && std::isfinite(p.load_n), "load_n", "above 0");
   require(std::isfinite(p.azimuth_deg), "azimuth_deg", "a number");
   require(p.support_share > 0 && p.support_share < 0.5, "support_share", "between 0 and 0.5");
+  require(p.triangles >= 500 && p.triangles <= 50000, "triangles", "from 500 to 50000");
   require(norm(p.up) > 0 && std::isfinite(norm(p.up)), "up", "a direction");
 }
 
@@ -43,6 +41,7 @@ struct Setting {
   Vec3d up;
   std::vector<Vec3d> forces_n;  // one per load case
   Material material;
+  double voxel_mm;
   Support support;
   Footprint footprint;
 };
@@ -54,7 +53,7 @@ struct Model {
 
 std::vector<fem::LoadCase> load_cases(const TetMesh& mesh, const Setting& setting,
                                       const std::function<bool(Vec3d)>& mine) {
-  const std::vector<double> shares = nodal_shares(mesh, setting.footprint, mine);
+  const std::vector<double> shares = nodal_shares(mesh, setting.footprint, 2 * setting.voxel_mm, mine);
   std::vector<fem::LoadCase> cases;
   for (const Vec3d& force : setting.forces_n) {
     fem::LoadCase load;
@@ -85,15 +84,24 @@ Model solve_body(TetMesh mesh, const VerifyParams& params, Setting& setting, con
 
 /// Stage 2: a candidate on its own mesh. On its cut faces it follows the body's coarse displacements.
 Model solve_component(TetMesh mesh, const Model& body, const fem::Locator& locator, const Partition& partition, int id,
-                      double tolerance_mm, const Setting& setting, const Context& context) {
+                      const Setting& setting, const Context& context) {
   std::vector<float> distance(mesh.nodes.size());
   partition.labels.region(id).evaluate(mesh.nodes, distance);
-  auto cases = load_cases(mesh, setting, [&](Vec3d p) { return partition.labels.label(p) == id; });
+  // Asked a voxel below the surface: a cut that runs in the surface itself would give the points to either side at
+  // random.
+  auto cases = load_cases(mesh, setting,
+                          [&](Vec3d p) { return partition.labels.label(p - setting.voxel_mm * setting.up) == id; });
+  std::vector<bool> on_cut(mesh.nodes.size(), false);
+  for (const TetFace& face : boundary(mesh)) {
+    for (const std::uint32_t node : face.nodes) {
+      on_cut[node] = static_cast<double>(distance[node]) > -setting.voxel_mm;
+    }
+  }
   std::vector<fem::Fixed> fixed;
   for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
     const Vec3d p = mesh.nodes[node];
     const bool supported = dot(p, setting.up) <= setting.support.limit_mm;
-    if (!supported && !(static_cast<double>(distance[node]) > -tolerance_mm)) continue;
+    if (!supported && !on_cut[node]) continue;
     for (int axis = 0; axis < 3; ++axis) fixed.push_back({node, axis});
     for (std::size_t c = 0; c < cases.size(); ++c) {
       const Vec3d u = supported ? Vec3d{} : locator.interpolate(body.solutions[c].displacement_mm, p);
@@ -290,14 +298,17 @@ struct Extracted {
   std::string failure;
 };
 
-Extracted extract_component(const Proxy& proxy, const Partition& partition, int id, const Context& context) {
+Extracted extract_component(const Proxy& proxy, const Partition& partition, int id, int body_triangles,
+                            const Context& context) {
   const Candidate& candidate = partition.candidates[static_cast<std::size_t>(id)];
   const double body = std::max(proxy.solid.volume_mm3(), candidate.volume_mm3);
   // Area goes with volume to the power of 2/3.
   const int triangles = std::clamp(static_cast<int>(body_triangles * std::pow(candidate.volume_mm3 / body, 2.0 / 3)),
-                                   least_component_triangles, most_component_triangles);
+                                   body_triangles / 4, 2 * body_triangles / 3);
+  // A little less than the region: where a cut runs in the body's surface, flakes of no thickness would stay.
+  const Shape region = offset(partition.labels.region(id), -0.1 * proxy.solid.grid().voxel_mm);
   try {
-    return {extract(proxy, partition.labels.region(id), {.max_surface_triangles = triangles}, context), {}};
+    return {extract(proxy, region, {.max_surface_triangles = triangles}, context), {}};
   } catch (const Error& error) {
     if (error.code() != Code::SolverFailed) throw;
     return {std::nullopt, error.what()};
@@ -311,13 +322,12 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   check_params(given);
   VerifyParams params = given;
   params.up = normalized(given.up);
-  Setting setting{params.up, {}, material, {}, {}};
+  Setting setting{params.up, {}, material, proxy.solid.grid().voxel_mm, {}, {}};
   for (const Vec3d& direction : load_directions(params.up, params.azimuth_deg)) {
     setting.forces_n.push_back(params.load_n * direction);
   }
   const std::size_t count = partition.candidates.size();
   const bool alone = count == 1;
-  const double voxel_mm = proxy.solid.grid().voxel_mm;
 
   // All meshes at once: the body's own, and one for each candidate.
   std::vector<Extracted> extracted(count);
@@ -325,9 +335,11 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   std::atomic<int> done = 0;
   tbb::parallel_for(std::size_t{0}, alone ? std::size_t{1} : count + 1, [&](std::size_t job) {
     if (job == 0) {
-      body_mesh = extract(proxy, everything(), {.max_surface_triangles = body_triangles}, context.part(0, 0, "verify"));
+      body_mesh =
+          extract(proxy, everything(), {.max_surface_triangles = params.triangles}, context.part(0, 0, "verify"));
     } else {
-      extracted[job - 1] = extract_component(proxy, partition, static_cast<int>(job - 1), context.part(0, 0, "verify"));
+      extracted[job - 1] = extract_component(proxy, partition, static_cast<int>(job - 1), params.triangles,
+                                             context.part(0, 0, "verify"));
     }
     context.progress(0.4 * ++done / static_cast<double>(count + 1));
   });
@@ -348,7 +360,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     const Candidate& candidate = partition.candidates[i];
     if (extracted[i].mesh) {
       try {
-        components[i] = solve_component(std::move(*extracted[i].mesh), body, locator, partition, id, voxel_mm, setting,
+        components[i] = solve_component(std::move(*extracted[i].mesh), body, locator, partition, id, setting,
                                         context.part(0.65, 0.65, "verify"));
       } catch (const Error& error) {
         if (error.code() != Code::SolverFailed) throw;
