@@ -5,88 +5,153 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
-#include <vector>
 
 namespace fibrolite {
 namespace {
 
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
+using openvdb::Coord;
 
-/// Pairs along one axis (stride 64, 8 or 1) within a leaf.
-std::int64_t within(const float* v, int stride, float limit) {
-  std::int64_t count = 0;
-  for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
-    if ((i / stride & 7) < 7) count += std::abs(v[i] - v[i + stride]) > limit ? 1 : 0;
-  }
-  return count;
+constexpr int size = static_cast<int>(Leaf::SIZE);
+constexpr std::array<int, 3> strides{64, 8, 1};
+
+bool contradict(float a, float b, float limit) { return (a < 0) != (b < 0) && (a - b) * (a - b) > limit * limit; }
+
+/// On one side only: nothing within can contradict.
+bool uniform(const float* v) {
+  int negative = 0;
+  for (int i = 0; i < size; ++i) negative += v[i] < 0 ? 1 : 0;
+  return negative == 0 || negative == size;
 }
 
-/// Pairs across the face towards the next leaf or tile.
-std::int64_t across(const float* v, const float* next, float tile, int stride, float limit) {
-  std::int64_t count = 0;
-  for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
-    if ((i / stride & 7) != 7) continue;
-    const float other = next != nullptr ? next[i - 7 * stride] : tile;
-    count += std::abs(v[i] - other) > limit ? 1 : 0;
+bool within(const float* v, float limit) {
+  for (const int stride : strides) {
+    for (int i = 0; i < size; ++i) {
+      if ((i / stride & 7) < 7 && contradict(v[i], v[i + stride], limit)) return true;
+    }
   }
-  return count;
+  return false;
 }
 
-/// Pairs across the face towards a tile on the lower side; a leaf there has counted them already.
-std::int64_t across_to_tile_below(const float* v, float tile, int stride, float limit) {
-  std::int64_t count = 0;
-  for (int i = 0; i < static_cast<int>(Leaf::SIZE); ++i) {
-    if ((i / stride & 7) == 0) count += std::abs(v[i] - tile) > limit ? 1 : 0;
+/// Between a leaf's face and the samples beyond it: `other` are a leaf's values, or one value that stands for all.
+bool across(const float* v, bool upper, const float* other, float tile, int stride, float limit) {
+  const int outer = 512 / (stride * 8), from = upper ? 7 * stride : 0, to = upper ? 0 : 7 * stride;
+  for (int i = 0; i < outer; ++i) {
+    for (int j = 0; j < stride; ++j) {
+      const int at = i * stride * 8 + j;
+      if (contradict(v[at + from], other != nullptr ? other[at + to] : tile, limit)) return true;
+    }
   }
-  return count;
+  return false;
 }
 
-}  // namespace
-
-std::int64_t contradictions(const Tree& tree, double voxel_mm) {
-  const openvdb::tree::LeafManager<const Tree> leaves(tree);
-  const auto limit = static_cast<float>(voxel_mm * 1.01);
-  std::vector<std::int64_t> part(leaves.leafCount(), 0);
-  constexpr std::array<int, 3> strides{64, 8, 1};
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size(), 64), [&](const auto& range) {
+/// Blocks of inner tiles that touch outer ones, and those outer ones. Almost all tiles lie among others of their node,
+/// whose table is quicker to read than the tree.
+void inner_tiles_at_the_outside(const Tree& tree, std::vector<Coord>& blocks) {
+  using Node = Tree::RootNodeType::ChildNodeType::ChildNodeType;
+  std::vector<const Node*> nodes;
+  tree.getNodes(nodes);
+  std::vector<std::vector<Coord>> found(nodes.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size()), [&](const auto& range) {
     openvdb::tree::ValueAccessor<const Tree> access(tree);
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const Leaf& leaf = leaves.leaf(i);
-      const float* v = leaf.buffer().data();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        openvdb::Coord step(0);
-        step[axis] = Leaf::DIM;
-        part[i] += within(v, strides[axis], limit);
-        const openvdb::Coord above = leaf.origin() + step, below = leaf.origin() - step;
-        const Leaf* next = access.probeConstLeaf(above);
-        part[i] += across(v, next != nullptr ? next->buffer().data() : nullptr,
-                          next != nullptr ? 0 : access.getValue(above), strides[axis], limit);
-        if (access.probeConstLeaf(below) == nullptr) {
-          part[i] += across_to_tile_below(v, access.getValue(below), strides[axis], limit);
+      const Node& node = *nodes[i];
+      const auto outer = [&](const Coord& place) {
+        return access.probeConstLeaf(place) == nullptr && access.getValue(place) >= 0;
+      };
+      for (openvdb::Index n = 0; n < Node::NUM_VALUES; ++n) {
+        if (node.isChildMaskOn(n) || node.getTable()[n].getValue() >= 0) continue;
+        const openvdb::Index local[3] = {n >> 8, n >> 4 & 15, n & 15};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const openvdb::Index stride = axis == 0 ? 256 : axis == 1 ? 16 : 1;
+          for (const int step : {-1, 1}) {
+            const bool same_node = step < 0 ? local[axis] > 0 : local[axis] < 15;
+            const openvdb::Index m = step < 0 ? n - stride : n + stride;
+            if (same_node && (node.isChildMaskOn(m) || node.getTable()[m].getValue() < 0)) continue;
+            Coord place = node.offsetToGlobalCoord(n);
+            const Coord inner = place;
+            place[axis] += 8 * step;
+            if (!same_node && !outer(place)) continue;
+            found[i].push_back(inner);
+            found[i].push_back(place);
+          }
         }
       }
     }
   });
-  std::int64_t sum = 0;
-  for (const std::int64_t n : part) sum += n;
-  // Inner tiles may not touch the outside.
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (const auto& list : found) blocks.insert(blocks.end(), list.begin(), list.end());
+  // Tiles of 128.
   openvdb::tree::ValueAccessor<const Tree> access(tree);
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 2);
   for (; tile; ++tile) {
     if (*tile >= 0) continue;
     const openvdb::CoordBBox box = tile.getBoundingBox();
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      openvdb::Coord step(0);
-      step[axis] = 1;
-      sum += access.getValue(box.max() + step) > 0 || access.getValue(box.min() - step) > 0 ? 1 : 0;
+      const std::size_t u = (axis + 1) % 3, w = (axis + 2) % 3;
+      for (const int step : {-1, 1}) {
+        Coord place;
+        place[axis] = step < 0 ? box.min()[axis] - 8 : box.max()[axis] + 1;
+        for (place[u] = box.min()[u]; place[u] <= box.max()[u]; place[u] += 8) {
+          for (place[w] = box.min()[w]; place[w] <= box.max()[w]; place[w] += 8) {
+            if (access.probeConstLeaf(place) != nullptr || access.getValue(place) < 0) continue;
+            Coord inner = place;
+            inner[axis] -= 8 * step;
+            blocks.push_back(inner);
+            blocks.push_back(place);
+          }
+        }
+      }
     }
   }
-  return sum;
+}
+
+}  // namespace
+
+std::vector<Coord> contradictions(const Tree& tree, double voxel_mm) {
+  const openvdb::tree::LeafManager<const Tree> leaves(tree);
+  const auto limit = static_cast<float>(voxel_mm * 1.01);
+  // One bit per direction of the face (-x +x -y +y -z +z) and one for the inside.
+  std::vector<unsigned char> found(leaves.leafCount(), 0);
+  const auto neighbour = [](const Coord& origin, int face) {
+    Coord place = origin;
+    place[static_cast<std::size_t>(face / 2)] += face % 2 == 1 ? 8 : -8;
+    return place;
+  };
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, found.size(), 64), [&](const auto& range) {
+    openvdb::tree::ValueAccessor<const Tree> access(tree);
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const Leaf& leaf = leaves.leaf(i);
+      const float* v = leaf.buffer().data();
+      unsigned bits = !uniform(v) && within(v, limit) ? 64U : 0U;
+      for (int face = 0; face < 6; ++face) {
+        const Coord place = neighbour(leaf.origin(), face);
+        const Leaf* next = access.probeConstLeaf(place);
+        const bool upper = face % 2 == 1;
+        if (next != nullptr && !upper) continue;  // seen from there
+        const float tile = next != nullptr ? 0 : access.getValue(place);
+        const float* other = next != nullptr ? next->buffer().data() : nullptr;
+        if (across(v, upper, other, tile, strides[static_cast<std::size_t>(face / 2)], limit)) bits |= 1U << face;
+      }
+      found[i] = static_cast<unsigned char>(bits);
+    }
+  });
+  std::vector<Coord> blocks;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i] == 0) continue;
+    blocks.push_back(leaves.leaf(i).origin());
+    for (int face = 0; face < 6; ++face) {
+      if ((found[i] >> face & 1) != 0) blocks.push_back(neighbour(leaves.leaf(i).origin(), face));
+    }
+  }
+  inner_tiles_at_the_outside(tree, blocks);
+  std::sort(blocks.begin(), blocks.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  return blocks;
 }
 
 }  // namespace fibrolite

@@ -4,12 +4,13 @@
 
 #include <openvdb/openvdb.h>
 
-#include <cstdint>
+#include <vector>
 
 namespace fibrolite {
 
-/// Neighbouring samples whose values differ by more than their spacing: no distance to one surface does that, so there
-/// the sides contradict each other (the surface overlaps itself). Cost: O(active voxels), parallel.
-[[nodiscard]] std::int64_t contradictions(const openvdb::FloatTree& tree, double voxel_mm);
+/// Samples at neighbouring places on different sides whose distances add up to more than their spacing: no surface can
+/// lie between them, so their sides contradict each other (the surface overlaps itself). Returns the samples' blocks of
+/// 8, each once, sorted. Cost: O(leaves), parallel.
+[[nodiscard]] std::vector<openvdb::Coord> contradictions(const openvdb::FloatTree& tree, double voxel_mm);
 
 }  // namespace fibrolite

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "band_check.h"
 #include "fibrolite/error.h"
 #include "fibrolite/winding.h"
 #include "surface_topology.h"
@@ -100,13 +99,14 @@ class Conversion {
   }
 
  private:
-  /// The distances of a closed mesh; nothing if its sides contradict each other.
-  openvdb::FloatTree::Ptr by_normals(const Mesh& mesh, const SurfaceTopology& topology, const Context& context) const {
+  /// The distances of a closed mesh; nothing if it overlaps itself.
+  openvdb::FloatTree::Ptr by_normals(const Mesh& mesh, const SurfaceTopology& topology, const Context& context) {
     const WindingTree winding(mesh);
     context.check();
     Band band = triangle_band(mesh, topology, winding, band_, context);
-    context.check();
-    if (contradictions(*band.tree, band_.voxel_mm) > 0) return nullptr;
+    if (band.overlap) return nullptr;
+    if (band.cells_by_winding > 0)
+      repairs_.emplace_back("self-intersections: sides decided by winding number around them");
     return band.tree;
   }
 

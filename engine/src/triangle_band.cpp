@@ -7,17 +7,18 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
-#include "fibrolite/error.h"
+#include "band_check.h"
+#include "triangle_cells.h"
 #include "triangle_kernel.h"
 
 namespace fibrolite {
@@ -27,7 +28,7 @@ using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 using openvdb::Coord;
 
-constexpr int cell_size = 64;
+constexpr int cell_size = TriangleCells::size;
 /// Blocks of 8 and less that the surface may cross need every triangle this near (voxels): their corners are at
 /// most 6.07 from their centre, a surface point at most as far again from the centre of a half block.
 constexpr float crossed_reach = 8.2F;
@@ -51,6 +52,7 @@ struct Cell {
   std::vector<std::unique_ptr<Leaf>> leaves;
   std::vector<Tile> inner;
   std::int64_t sides_by_mesh = 0, sides_by_winding = 0;
+  bool overlap = false;  ///< A winding number that is neither 0 nor 1 in a place thicker than a voxel.
 };
 
 struct Scratch {
@@ -70,139 +72,18 @@ class Builder {
         reach_crossed_(std::max({params.outside_vox, params.inside_vox, crossed_reach})) {}
 
   Band run(const Context& context) {
-    sort_into_cells();
-    find_far_cells();
-    const std::size_t n = cells_.size();
-    std::vector<Cell> results(n);
-    tbb::enumerable_thread_specific<Scratch> scratch;
-    std::atomic<std::size_t> done{0};
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 1), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        context.check();
-        fill(cells_[i], scratch.local(), results[i]);
-        context.progress(0.95 * static_cast<double>(++done) / static_cast<double>(n));
-      }
-    });
-    Band band = assemble(results);
+    cells_ = triangle_cells(mesh_, params_.voxel_mm, reach_crossed_ + search_margin);
+    std::vector<std::size_t> all(cells_.cells.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    band_.tree = std::make_shared<Tree>(static_cast<float>(params_.voxel_mm) * params_.outside_vox);
+    put(fill(all, params_.by_winding, context.part(0, 0.9, "")));
+    if (!params_.by_winding) settle(context);
     context.progress(1);
-    return band;
+    return std::move(band_);
   }
 
  private:
-  struct CellJob {
-    Coord origin;
-    int size;                  ///< 64, or 128 for a far one.
-    std::size_t first, count;  ///< Its triangles in pairs_.
-  };
-
-  // ---- which cells there are ----
-
   [[nodiscard]] Vec3d in_voxels(std::uint32_t vertex) const { return scale_ * to_double(mesh_.vertices[vertex]); }
-  [[nodiscard]] Coord cell_origin(std::uint64_t key) const {
-    const auto y = static_cast<std::uint64_t>(cells_y_), z = static_cast<std::uint64_t>(cells_z_);
-    return first_cell_ +
-           cells_to_samples(static_cast<int>(key / (y * z)), static_cast<int>(key / z % y), static_cast<int>(key % z));
-  }
-
-  void sort_into_cells() {
-    Box3d box;
-    for (const Mesh::Triangle& t : mesh_.triangles) {
-      for (const std::uint32_t v : t) box.include(in_voxels(v));
-    }
-    const double margin = reach_crossed_ + search_margin + 1.0;
-    const auto floor_cell = [](double x) { return static_cast<std::int64_t>(std::floor(x / cell_size)); };
-    const std::int64_t lo[3] = {floor_cell(box.min.x - margin), floor_cell(box.min.y - margin),
-                                floor_cell(box.min.z - margin)};
-    const std::int64_t hi[3] = {floor_cell(box.max.x + margin), floor_cell(box.max.y + margin),
-                                floor_cell(box.max.z + margin)};
-    // Whole nodes of 128, so that far ones can be decided at once.
-    const auto even = [](std::int64_t x) { return x & ~std::int64_t{1}; };
-    const auto count = [&](int a) { return even(hi[a]) + 2 - even(lo[a]); };
-    cells_x_ = count(0), cells_y_ = count(1), cells_z_ = count(2);
-    if (cells_x_ * cells_y_ > std::int64_t{1} << 32 ||
-        cells_x_ * cells_y_ * cells_z_ >= std::int64_t{std::numeric_limits<std::uint32_t>::max()}) {
-      throw Error(Code::TooLarge, "the model has more voxels than can be indexed", {}, "use a larger --voxel");
-    }
-    first_cell_ = Coord(static_cast<int>(even(lo[0]) * cell_size), static_cast<int>(even(lo[1]) * cell_size),
-                        static_cast<int>(even(lo[2]) * cell_size));
-
-    constexpr std::size_t chunk = 8192;
-    const std::size_t n = mesh_.triangles.size(), chunks = (n + chunk - 1) / chunk;
-    std::vector<std::vector<std::uint64_t>> parts(chunks);
-    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
-      for (std::size_t t = c * chunk; t < std::min(n, (c + 1) * chunk); ++t) {
-        touch_cells(static_cast<std::uint32_t>(t), parts[c]);
-      }
-    });
-    std::size_t total = 0;
-    for (const auto& part : parts) total += part.size();
-    pairs_.reserve(total);
-    for (auto& part : parts) {
-      pairs_.insert(pairs_.end(), part.begin(), part.end());
-      std::vector<std::uint64_t>().swap(part);
-    }
-    tbb::parallel_sort(pairs_.begin(), pairs_.end());
-    for (std::size_t i = 0; i < pairs_.size();) {
-      std::size_t end = i;
-      while (end < pairs_.size() && pairs_[end] >> 32 == pairs_[i] >> 32) ++end;
-      cells_.push_back({cell_origin(pairs_[i] >> 32), cell_size, i, end - i});
-      i = end;
-    }
-  }
-
-  /// The cells within reach of a triangle: of its box, and of its plane.
-  void touch_cells(std::uint32_t triangle, std::vector<std::uint64_t>& pairs) const {
-    const Mesh::Triangle& t = mesh_.triangles[triangle];
-    const Vec3d origin{1.0 * first_cell_.x(), 1.0 * first_cell_.y(), 1.0 * first_cell_.z()};
-    const Vec3d a = in_voxels(t[0]) - origin, b = in_voxels(t[1]) - origin, c = in_voxels(t[2]) - origin;
-    Box3d box;
-    box.include(a), box.include(b), box.include(c);
-    box = box.grown(reach_crossed_ + search_margin);
-    const Vec3d normal = normalized(cross(b - a, c - a));
-    const double half = 0.5 * (cell_size - 1);
-    const double limit =
-        reach_crossed_ + search_margin + half * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z)) + 1e-3;
-    // Samples of cell i lie in [64 i, 64 i + 63].
-    const auto low = [](double x) { return static_cast<std::int64_t>(std::ceil((x - (cell_size - 1)) / cell_size)); };
-    const auto high = [](double x) { return static_cast<std::int64_t>(std::floor(x / cell_size)); };
-    for (std::int64_t x = low(box.min.x); x <= high(box.max.x); ++x) {
-      for (std::int64_t y = low(box.min.y); y <= high(box.max.y); ++y) {
-        for (std::int64_t z = low(box.min.z); z <= high(box.max.z); ++z) {
-          const Vec3d center{64.0 * static_cast<double>(x) + half, 64.0 * static_cast<double>(y) + half,
-                             64.0 * static_cast<double>(z) + half};
-          if (std::abs(dot(center - a, normal)) > limit) continue;
-          const auto cell = static_cast<std::uint64_t>((x * cells_y_ + y) * cells_z_ + z);
-          pairs.push_back(cell << 32 | triangle);
-        }
-      }
-    }
-  }
-
-  /// Cells that no triangle reaches still have a side: one job per free node of 128, else one per free cell.
-  void find_far_cells() {
-    std::vector<bool> taken(static_cast<std::size_t>(cells_x_ * cells_y_ * cells_z_), false);
-    const auto key = [&](std::int64_t x, std::int64_t y, std::int64_t z) {
-      return static_cast<std::size_t>((x * cells_y_ + y) * cells_z_ + z);
-    };
-    for (std::size_t i = 0; i < cells_.size(); ++i) taken[pairs_[cells_[i].first] >> 32] = true;
-    const auto origin = [&](std::int64_t x, std::int64_t y, std::int64_t z) { return cell_origin(key(x, y, z)); };
-    for (std::int64_t x = 0; x < cells_x_; x += 2) {
-      for (std::int64_t y = 0; y < cells_y_; y += 2) {
-        for (std::int64_t z = 0; z < cells_z_; z += 2) {
-          int free = 0;
-          for (int k = 0; k < 8; ++k) free += taken[key(x + (k >> 2), y + (k >> 1 & 1), z + (k & 1))] ? 0 : 1;
-          if (free == 8) {
-            cells_.push_back({origin(x, y, z), 2 * cell_size, 0, 0});
-            continue;
-          }
-          for (int k = 0; k < 8; ++k) {
-            const std::int64_t i = x + (k >> 2), j = y + (k >> 1 & 1), l = z + (k & 1);
-            if (!taken[key(i, j, l)]) cells_.push_back({origin(i, j, l), cell_size, 0, 0});
-          }
-        }
-      }
-    }
-  }
 
   // ---- sides ----
 
@@ -225,8 +106,9 @@ class Builder {
   }
 
   /// The side of a block that no triangle crosses; `crossed` if the winding number may pass 1/2 within it.
-  [[nodiscard]] Side side_by_winding(Vec3d p_vox, double radius) const {
+  [[nodiscard]] Side side_by_winding(Vec3d p_vox, double radius, Cell& result) const {
     const double w = winding_.winding(params_.voxel_mm * p_vox);
+    result.overlap = result.overlap || w > 1.5 || w < -0.5;
     if (!topology_.closed() && std::abs(w - 0.5) <= winding_slope(p_vox, radius) * radius + 0.02) return crossed;
     return w > 0.5 ? inside : outside;
   }
@@ -246,25 +128,98 @@ class Builder {
     return along > 0 ? outside : inside;
   }
 
-  // ---- one cell ----
+  // ---- cells ----
+
+  [[nodiscard]] std::vector<Cell> fill(const std::vector<std::size_t>& which, bool by_winding,
+                                       const Context& context) const {
+    std::vector<Cell> results(which.size());
+    tbb::enumerable_thread_specific<Scratch> scratch;
+    std::atomic<std::size_t> done{0};
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, which.size(), 1), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        context.check();
+        fill_cell(cells_.cells[which[i]], by_winding, scratch.local(), results[i]);
+        context.progress(static_cast<double>(++done) / static_cast<double>(which.size()));
+      }
+    });
+    return results;
+  }
+
+  void put(std::vector<Cell> cells) {
+    const float inner = -static_cast<float>(params_.voxel_mm) * params_.inside_vox;
+    openvdb::tree::ValueAccessor<Tree> accessor(*band_.tree);
+    for (Cell& cell : cells) {
+      for (auto& leaf : cell.leaves) accessor.addLeaf(leaf.release());
+      for (const Tile& tile : cell.inner) {
+        if (tile.size == 2 * cell_size) {
+          accessor.addTile(2, tile.origin, inner, false);
+          continue;
+        }
+        for (int x = 0; x < tile.size; x += 8) {
+          for (int y = 0; y < tile.size; y += 8) {
+            for (int z = 0; z < tile.size; z += 8) accessor.addTile(1, tile.origin + Coord(x, y, z), inner, false);
+          }
+        }
+      }
+      band_.sides_by_mesh += cell.sides_by_mesh;
+      band_.sides_by_winding += cell.sides_by_winding;
+      band_.overlap = band_.overlap || cell.overlap;
+    }
+  }
+
+  /// Where a surface meets itself, the closest feature may tell the wrong side. Sides that contradict each other show
+  /// it: their cells are filled again by winding number, and so on while that contradicts their neighbours.
+  void settle(const Context& context) {
+    std::vector<bool> settled(cells_.cells.size(), false);
+    std::map<Coord, std::size_t> place;
+    for (std::size_t i = 0; i < cells_.cells.size(); ++i) place[cells_.cells[i].origin] = i;
+    while (!band_.overlap) {
+      context.check();
+      std::vector<std::size_t> again;
+      for (const Coord& block : contradictions(*band_.tree, params_.voxel_mm)) {
+        auto cell = place.find(block & ~(cell_size - 1));
+        if (cell == place.end()) cell = place.find(block & ~(2 * cell_size - 1));
+        if (cell == place.end() || settled[cell->second]) continue;
+        settled[cell->second] = true;
+        again.push_back(cell->second);
+      }
+      if (again.empty()) return;
+      std::sort(again.begin(), again.end());
+      band_.cells_by_winding += static_cast<std::int64_t>(again.size());
+      openvdb::tree::ValueAccessor<Tree> accessor(*band_.tree);
+      for (const std::size_t i : again) {
+        const TriangleCells::Cell& cell = cells_.cells[i];
+        for (int x = 0; x < cell.size; x += 8) {
+          for (int y = 0; y < cell.size; y += 8) {
+            for (int z = 0; z < cell.size; z += 8) {
+              accessor.addTile(1, cell.origin + Coord(x, y, z), band_.tree->background(), false);
+            }
+          }
+        }
+      }
+      put(fill(again, true, context.part(0.9, 1, "")));
+    }
+  }
 
   struct Block {
     Vec3d cell_center;  ///< Voxels.
     Coord cell_middle;  ///< The sample just above the centre.
+    bool by_winding;
     Scratch& scratch;
     Cell& result;
   };
 
-  void fill(const CellJob& job, Scratch& scratch, Cell& result) const {
+  void fill_cell(const TriangleCells::Cell& job, bool by_winding, Scratch& scratch, Cell& result) const {
     const double half = 0.5 * (job.size - 1);
     const Vec3d center{job.origin.x() + half, job.origin.y() + half, job.origin.z() + half};
     if (job.count == 0) {
-      const Side side = side_by_winding(center, half * std::numbers::sqrt3);
+      const Side side = side_by_winding(center, half * std::numbers::sqrt3, result);
       if (side == inside) result.inner.push_back({job.origin, job.size});
       if (side != crossed) return;
       if (job.size > cell_size) {
         for (int k = 0; k < 8; ++k) {
-          fill({job.origin + cells_to_samples(k >> 2, k >> 1 & 1, k & 1), cell_size, 0, 0}, scratch, result);
+          fill_cell({job.origin + cells_to_samples(k >> 2, k >> 1 & 1, k & 1), cell_size, 0, 0}, by_winding, scratch,
+                    result);
         }
         return;
       }
@@ -272,13 +227,13 @@ class Builder {
     scratch.frames.clear();
     scratch.all.clear();
     for (std::size_t i = 0; i < job.count; ++i) {
-      const auto triangle = static_cast<std::uint32_t>(pairs_[job.first + i]);
+      const auto triangle = static_cast<std::uint32_t>(cells_.triangles[job.first + i]);
       const Mesh::Triangle& t = mesh_.triangles[triangle];
       scratch.frames.push_back(
           make_frame(in_voxels(t[0]) - center, in_voxels(t[1]) - center, in_voxels(t[2]) - center, triangle));
       scratch.all.push_back(static_cast<std::uint32_t>(i));
     }
-    const Block block{center, job.origin + Coord(cell_size / 2), scratch, result};
+    const Block block{center, job.origin + Coord(cell_size / 2), by_winding, scratch, result};
     split(block, {}, cell_size, crossed, scratch.all.data(), static_cast<int>(job.count),
           reach_crossed_ + search_margin);
   }
@@ -320,10 +275,10 @@ class Builder {
         // The list holds all triangles within reach of the parent, so the nearest one is known this far from the
         // child's centre.
         const bool known = d <= reach + 0.5F * static_cast<float>(child) - 0.5F;
-        if (!params_.by_winding && known) {
+        if (!block.by_winding && known) {
           c.side[k] = side_by_normal(block.scratch.frames[static_cast<std::size_t>(c.nearest.frame[k])], p);
         }
-        if (c.side[k] == crossed) c.side[k] = side_by_winding(world, radius);
+        if (c.side[k] == crossed) c.side[k] = side_by_winding(world, radius, block.result);
       }
       const float band = c.side[k] == outside ? params_.outside_vox : params_.inside_vox;
       const float margin = child >= 16 ? search_margin : 0.0F;
@@ -365,7 +320,7 @@ class Builder {
     alignas(32) float values[Leaf::SIZE];  // voxels
     Children c;
     divide(block, center, Leaf::DIM, side, list, count, reach, c);
-    const bool winding = params_.by_winding && side == crossed;
+    const bool winding = block.by_winding && side == crossed;
     for (int k = 0; k < 8; ++k) {
       const int at = ((k >> 2) * 64 + (k >> 1 & 1) * 8 + (k & 1)) * 4;
       const Side child = c.side[k];
@@ -394,37 +349,36 @@ class Builder {
   }
 
   /// Signs for unsigned distances. Two neighbours whose distances add up to more than their spacing have no triangle
-  /// between them, so one query does for all samples so connected, as long as the border is too far to change the
-  /// number among them.
+  /// between them, so one query does for all samples so connected, as far as the border lets the number be the same.
   void sides_by_winding(const Block& block, Vec3f center, float* values) const {
     constexpr int size = Leaf::SIZE;
-    const Vec3d corner = block.cell_center + to_double(center) - Vec3d{3.5, 3.5, 3.5};
+    const Vec3d middle = block.cell_center + to_double(center), corner = middle - Vec3d{3.5, 3.5, 3.5};
     const auto point = [&](int i) { return corner + Vec3d{1.0 * (i >> 6), 1.0 * (i >> 3 & 7), 1.0 * (i & 7)}; };
+    const double slope = topology_.closed() ? 0 : winding_slope(middle, 6.1);
     float distances[size];
     std::copy_n(values, size, distances);
-    const bool tame =
-        topology_.closed() || winding_slope(block.cell_center + to_double(center), 6.1) * 3 * Leaf::DIM < 0.2;
-    bool done[size] = {};
-    int stack[size];
+    int steps[size], queue[size];
+    std::fill_n(steps, size, -1);
     for (int seed = 0; seed < size; ++seed) {
-      if (done[seed]) continue;
-      const double w = winding_.winding(params_.voxel_mm * point(seed));
+      if (steps[seed] >= 0) continue;
+      const double w = winding_.winding(params_.voxel_mm * point(seed)), off = std::abs(w - 0.5);
       const float sign = w > 0.5 ? -1.0F : 1.0F;
-      done[seed] = true;
-      values[seed] = sign * distances[seed];
-      if (!tame || std::abs(w - 0.5) < 0.25) {
-        values[seed] = sign * std::min(distances[seed], voxels_per_turn * static_cast<float>(std::abs(w - 0.5)));
-        continue;
-      }
-      int height = 0;
-      stack[height++] = seed;
-      while (height > 0) {
-        const int i = stack[--height];
+      steps[seed] = 0;
+      values[seed] = sign * (topology_.closed() ? distances[seed]
+                                                : std::min(distances[seed], voxels_per_turn * static_cast<float>(off)));
+      float deepest = distances[seed];
+      int begin = 0, end = 0;
+      queue[end++] = seed;
+      while (begin < end) {
+        const int i = queue[begin++];
+        const int step = steps[i] + 1;
+        if (off - slope * step < (topology_.closed() ? 0.0 : 0.25)) break;
         const auto visit = [&](int j) {
-          if (done[j] || !(distances[i] + distances[j] > 1.001F)) return;
-          done[j] = true;
+          if (steps[j] >= 0 || !(distances[i] + distances[j] > 1.001F)) return;
+          steps[j] = step;
           values[j] = sign * distances[j];
-          stack[height++] = j;
+          deepest = std::max(deepest, distances[j]);
+          queue[end++] = j;
         };
         if ((i >> 6) > 0) visit(i - 64);
         if ((i >> 6) < 7) visit(i + 64);
@@ -433,6 +387,7 @@ class Builder {
         if ((i & 7) > 0) visit(i - 1);
         if ((i & 7) < 7) visit(i + 1);
       }
+      if ((w > 1.5 || w < -0.5) && deepest > 0.75F) block.result.overlap = true;
     }
     const auto compare = [&](int i, int j) {
       if ((values[i] < 0) == (values[j] < 0)) return;
@@ -473,44 +428,14 @@ class Builder {
     }
   }
 
-  // ---- the tree ----
-
-  [[nodiscard]] Band assemble(std::vector<Cell>& cells) const {
-    const auto voxel = static_cast<float>(params_.voxel_mm);
-    const float inner = -voxel * params_.inside_vox;
-    Band band;
-    band.tree = std::make_shared<Tree>(voxel * params_.outside_vox);
-    Tree& tree = *band.tree;
-    openvdb::tree::ValueAccessor<Tree> accessor(tree);
-    for (Cell& cell : cells) {
-      for (auto& leaf : cell.leaves) accessor.addLeaf(leaf.release());
-      for (const Tile& tile : cell.inner) {
-        if (tile.size == 128) {
-          tree.addTile(2, tile.origin, inner, false);
-          continue;
-        }
-        for (int x = 0; x < tile.size; x += 8) {
-          for (int y = 0; y < tile.size; y += 8) {
-            for (int z = 0; z < tile.size; z += 8) accessor.addTile(1, tile.origin + Coord(x, y, z), inner, false);
-          }
-        }
-      }
-      band.sides_by_mesh += cell.sides_by_mesh;
-      band.sides_by_winding += cell.sides_by_winding;
-    }
-    return band;
-  }
-
   const Mesh& mesh_;
   const SurfaceTopology& topology_;
   const WindingTree& winding_;
   const BandParams params_;
   const double scale_;
   const float reach_crossed_;
-  Coord first_cell_;
-  std::int64_t cells_x_ = 0, cells_y_ = 0, cells_z_ = 0;
-  std::vector<std::uint64_t> pairs_;  ///< cell << 32 | triangle, sorted
-  std::vector<CellJob> cells_;
+  TriangleCells cells_;
+  Band band_;
 };
 
 }  // namespace

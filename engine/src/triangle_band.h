@@ -14,15 +14,18 @@ namespace fibrolite {
 struct BandParams {
   double voxel_mm = 0;
   float outside_vox = 0, inside_vox = 0;  ///< Where the band ends on either side.
-  /// false: side by pseudonormal near the surface; the mesh must be closed and must not overlap itself. true: side by
-  /// winding number everywhere, for any mesh; where the number passes 1/2 away from all triangles the values rise away
-  /// from there, but are no distances.
+  /// false: side by pseudonormal near the surface, by winding number in cells where that leads to contradictions; the
+  /// mesh must be closed, and the distances count every wall, so the result is of use only if `overlap` stays false.
+  /// true: side by winding number everywhere, for any mesh; where the number passes 1/2 away from all triangles the
+  /// values rise away from there, but are no distances.
   bool by_winding = false;
 };
 struct Band {
   openvdb::FloatTree::Ptr tree;  ///< Background +outside, inner tiles and clamped values -inside, mm.
   /// Pairs of neighbouring samples on different sides, with the mesh between them and without (by_winding only).
   std::int64_t sides_by_mesh = 0, sides_by_winding = 0;
+  std::int64_t cells_by_winding = 0;  ///< Cells of 64^3 samples with contradictions, decided by winding number.
+  bool overlap = false;  ///< The mesh overlaps itself by more than a voxel (seen where the winding number was asked).
 };
 [[nodiscard]] Band triangle_band(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding,
                                  const BandParams& params, const Context& context);
