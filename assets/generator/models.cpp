@@ -65,27 +65,27 @@ Shape rounded_cylinder(Vec3d a, Vec3d b, double radius_mm, double edge_mm) {
 /// Flat feet with a soft edge: what lies below the ground is cut off.
 Shape standing(const Shape& shape) { return smooth_subtract(shape, half_space({}, {0, 0, 1}), 2); }
 
-// A stocky hoofed animal, nose along +x. The legs are about a third of the body's thickness, yet wide enough for
-// fibres.
+// A hoofed animal, nose along +x. Legs, tail and ears are about equally thick, a quarter of the body, so that the legs
+// stand out by their diameter, yet wide enough for fibres.
 Shape quadruped() {
-  const Shape trunk = limb({{{-31, 0, 47}, 13.2}, {{-10, 0, 45.5}, 13.6}, {{15, 0, 46}, 14.6}});
-  const Shape neck = limb({{{14, 0, 48}, 12.5}, {{23, 0, 57}, 9.4}, {{31, 0, 68}, 7.2}, {{33, 0, 72}, 6.6}});
-  const Shape head = limb({{{32, 0, 72}, 6.6}, {{40, 0, 68.5}, 5.6}, {{49, 0, 62.5}, 4.4}});
-  const Shape ears = pair({{{31.5, 3.8, 76}, 2.5}, {{30.0, 5.0, 80}, 2.3}, {{29.5, 5.6, 83.5}, 1.3}}, 1);
+  const Shape trunk = limb({{{-31, 0, 48}, 14.0}, {{-10, 0, 46.5}, 14.4}, {{14, 0, 47}, 15.2}});
+  const Shape neck = limb({{{14, 0, 49}, 12.5}, {{23, 0, 59}, 9.4}, {{31, 0, 70}, 7.2}, {{33, 0, 74}, 6.6}});
+  const Shape head = limb({{{32, 0, 74}, 6.8}, {{40, 0, 70.5}, 6.0}, {{48.5, 0, 64.5}, 5.0}});
+  const Shape ears = pair({{{31.5, 4.0, 77}, 3.0}, {{29.8, 5.6, 82}, 2.9}, {{29.0, 6.2, 85}, 2.4}}, 1);
   const Shape front =
-      pair({{{18, 6.5, 44}, 8.5}, {{20, 7.8, 31}, 6.4}, {{20.5, 8.3, 20}, 5.0}, {{20, 8.5, 5}, 4.5}}, 1);
+      pair({{{17, 6.5, 45}, 8.5}, {{19.5, 8.2, 33}, 5.2}, {{20.5, 9.0, 20}, 4.0}, {{20, 9.2, 5}, 3.9}}, 1);
   const Shape hind =
-      pair({{{-31, 6.5, 46}, 11}, {{-29, 7.8, 33}, 8.0}, {{-34, 8.5, 19}, 5.0}, {{-32.5, 8.5, 5}, 4.5}}, 1);
+      pair({{{-31, 6.5, 47}, 10.5}, {{-29.5, 8.2, 34}, 6.2}, {{-34, 9.0, 20}, 4.1}, {{-32.5, 9.2, 5}, 3.9}}, 1);
   std::vector<Shape> hooves;
-  for (const double x : {20.6, -31.9}) {
-    for (const double y : {-8.5, 8.5}) hooves.push_back(rounded_cylinder({x, y, 0}, {x, y, 5.5}, 5.3, 1.2));
+  for (const double x : {20.5, -32.0}) {
+    for (const double y : {-9.2, 9.2}) hooves.push_back(rounded_cylinder({x, y, 0}, {x, y, 5}, 4.5, 1.2));
   }
-  const Shape tail = limb({{{-40, 0, 54}, 3.6}, {{-47, 0, 49}, 3.0}, {{-50.5, 0, 38}, 3.0}, {{-51, 0, 25}, 1.9}});
+  const Shape tail = limb({{{-41, 0, 55}, 4.0}, {{-48, 0, 50}, 3.4}, {{-51.5, 0, 39}, 3.2}, {{-52, 0, 26}, 2.8}});
   Shape body = smooth_unite(trunk, neck, 5);
   body = smooth_unite(body, head, 2.5);
   body = smooth_unite(body, ears, 1.5);
-  const Shape legs = smooth_unite(unite({front, hind}), unite(hooves), 2.5);
-  body = smooth_unite(body, legs, 5);
+  const Shape legs = smooth_unite(unite({front, hind}), unite(hooves), 2);
+  body = smooth_unite(body, legs, 4);
   return smooth_unite(body, tail, 3);
 }
 
@@ -147,22 +147,22 @@ Shape figure() {
   return standing(body);
 }
 
-// A plate with two screw bosses that carries a bearing ring on three struts.
+// A thick plate with two screw bosses that carries a bearing ring on three struts, half as thick as plate and ring.
 Shape bracket() {
-  Shape body = rounded_cuboid({{-52, -30, -6}, {52, 30, 9}}, 3);
+  Shape body = rounded_cuboid({{-52, -30, -6}, {52, 30, 16}}, 3);
   for (const double sx : {-1.0, 1.0}) {
-    body = smooth_unite(body, rounded_cylinder({sx * 38, 0, 0}, {sx * 38, 0, 17}, 11.5, 1.2), 3);
+    body = smooth_unite(body, rounded_cylinder({sx * 36, 0, 0}, {sx * 36, 0, 22}, 14, 1.5), 3);
   }
-  Shape hub = rounded_cylinder({0, 0, 62}, {0, 0, 80}, 20, 2);
-  const std::array<Vec2d, 3> feet{{{0, 20}, {-19, -15}, {19, -15}}};
+  Shape hub = rounded_cylinder({0, 0, 64}, {0, 0, 82}, 23, 2);
+  const std::array<Vec2d, 3> feet{{{0, 21}, {-18, -14}, {18, -14}}};
   for (const Vec2d& foot : feet) {
-    const double inward = 14 / norm(foot);
-    hub = smooth_unite(hub, capsule({foot.x, foot.y, 4}, {inward * foot.x, inward * foot.y, 68}, 4.9), 2);
+    const double inward = 16 / norm(foot);
+    hub = smooth_unite(hub, capsule({foot.x, foot.y, 10}, {inward * foot.x, inward * foot.y, 70}, 3.9), 2);
   }
   body = smooth_unite(body, hub, 4);
-  body = smooth_subtract(body, cylinder({0, 0, 50}, {0, 0, 90}, 11), 2.5);
+  body = smooth_subtract(body, cylinder({0, 0, 50}, {0, 0, 100}, 9), 2.5);
   for (const double sx : {-1.0, 1.0}) {
-    body = smooth_subtract(body, cylinder({sx * 38, 0, -20}, {sx * 38, 0, 30}, 5), 1.2);
+    body = smooth_subtract(body, cylinder({sx * 36, 0, -20}, {sx * 36, 0, 40}, 4), 1.2);
   }
   return standing(body);
 }
@@ -208,7 +208,7 @@ const std::array<Model, 8>& models() {
       {"quadruped", quadruped, {{-60, -26, -4}, {60, 26, 90}}, 0.85, {}, 100},
       {"molar", molar, {{-32, -28, -6}, {32, 28, 90}}, 1.0, Vec3d{50, 40, 80}},
       {"figure", figure, {{-42, -22, -4}, {42, 18, 126}}, 0.8, {}, 120},
-      {"bracket", bracket, {{-58, -36, -4}, {58, 36, 86}}, 1.0, {}, 0},
+      {"bracket", bracket, {{-58, -36, -4}, {58, 36, 88}}, 1.05, {}, 0},
       {"cylinder_on_box", cylinder_on_box, {{-25, -25, -5}, {25, 25, 75}}, 0.65, {}, 0},
       {"bent_tube", bent_tube, {{-14, -14, -4}, {70, 14, 96}}, 0.8, {}, 0},
       {"y", y_branch, {{-46, -16, -4}, {46, 16, 104}}, 0.8, {}, 0},

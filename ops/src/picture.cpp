@@ -49,7 +49,8 @@ RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& colo
     raster.draw_cap(solid, bounds(surface), view, *cut, outline_mm, context.part(0.3, 0.5, ""));
   }
   context.progress(0.5);
-  return shade(raster, surface, view, cut, color, params, samples, context.part(0.5, 1, ""));
+  const double inset_mm = 0.5 * solid.grid().voxel_mm;
+  return shade(raster, surface, view, cut, color, params, samples, inset_mm, context.part(0.5, 1, ""));
 }
 
 void write_png(const std::filesystem::path& path, const RgbImage& image) {

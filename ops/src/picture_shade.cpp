@@ -44,8 +44,15 @@ Light decode(Rgb c) { return {decode(c.r), decode(c.g), decode(c.b)}; }
 class Shader {
  public:
   Shader(const Raster& raster, const Mesh& mesh, const View& view, const std::optional<CutPlane>& cut,
-         const PointColor& color, const PictureParams& params, int samples)
-      : raster_(raster), mesh_(mesh), view_(view), cut_(cut), color_(color), params_(params), samples_(samples) {}
+         const PointColor& color, const PictureParams& params, int samples, double inset_mm)
+      : raster_(raster),
+        mesh_(mesh),
+        view_(view),
+        cut_(cut),
+        color_(color),
+        params_(params),
+        samples_(samples),
+        inset_mm_(inset_mm) {}
 
   RgbImage run(const Context& context);
 
@@ -64,6 +71,9 @@ class Shader {
     return static_cast<std::size_t>(sy) * static_cast<std::size_t>(view_.width) + static_cast<std::size_t>(sx);
   }
   [[nodiscard]] Vec3d normal(int sx, int sy) const;
+  /// Samples of one layer lie within a few pixels' width in depth.
+  [[nodiscard]] double layer_mm() const { return 4.0 * samples_ / view_.samples_per_mm; }
+  [[nodiscard]] Vec3d inside(int sx, int sy) const;
   void find_normals();
   void find_colors(const Context& context);
   void color_pixel(int x, int y, bool every_sample);
@@ -80,6 +90,7 @@ class Shader {
   const PointColor& color_;
   const PictureParams& params_;
   int samples_;
+  double inset_mm_;
   double size_mm_ = 1;
   std::vector<Vec3f> vertex_normals_;
   std::vector<Rgb> colors_;  ///< Of each sample.
@@ -132,8 +143,7 @@ void Shader::find_colors(const Context& context) {
 }
 
 void Shader::color_pixel(int x, int y, bool every_sample) {
-  // Samples of one layer lie within a few samples' width in depth.
-  const double same_layer_mm = 4.0 * samples_ / view_.samples_per_mm;
+  const double same_layer_mm = layer_mm();
   struct Known {
     double depth;
     bool cap;
@@ -154,12 +164,18 @@ void Shader::color_pixel(int x, int y, bool every_sample) {
       if (found != end) {
         colors_[sample_index(sx, sy)] = found->color;
       } else {
-        const Rgb c = color_(position(sx, sy));
+        const Rgb c = color_(inside(sx, sy));
         colors_[sample_index(sx, sy)] = c;
         if (count < known.size()) known[count++] = {depth, cap, c};
       }
     }
   }
+}
+
+// On the surface itself a rounding decides to which of two touching things a point belongs: half a voxel in, none does.
+Vec3d Shader::inside(int sx, int sy) const {
+  const Vec3d p = position(sx, sy);
+  return Raster::is_cap(raster_(sx, sy)) ? p : p - inset_mm_ * normal(sx, sy);
 }
 
 bool Shader::crosses_border(int x, int y) const {
@@ -172,7 +188,11 @@ bool Shader::crosses_border(int x, int y) const {
     for (int i = -1; i <= 1; ++i) {
       const int nx = sx + i * samples_, ny = sy + j * samples_;
       if (nx < 0 || ny < 0 || nx >= view_.width || ny >= view_.height || Raster::empty(raster_(nx, ny))) continue;
-      if (colors_[sample_index(nx, ny)] != own) return true;
+      // Where one thing hides another the layers have been told apart already.
+      const std::uint64_t next = raster_(nx, ny);
+      const bool same_layer = Raster::is_cap(next) == Raster::is_cap(word) &&
+                              std::abs(Raster::depth_mm(next) - Raster::depth_mm(word)) < layer_mm();
+      if (same_layer && colors_[sample_index(nx, ny)] != own) return true;
     }
   }
   return false;
@@ -254,7 +274,7 @@ Light Shader::surface_light(int sx, int sy, float open) const {
   if (!cut_) return light;
   // What lies behind the cut sinks into a cool dark.
   const double behind = std::max(0.0, -cut_->side(position(sx, sy)));
-  const auto haze = static_cast<float>(0.30 * (1 - std::exp(-behind / (0.22 * size_mm_))));
+  const auto haze = static_cast<float>(0.40 * (1 - std::exp(-behind / (0.17 * size_mm_))));
   return mix(light, {0.035F, 0.045F, 0.065F}, haze);
 }
 
@@ -303,8 +323,9 @@ RgbImage Shader::run(const Context& context) {
 }  // namespace
 
 RgbImage shade(const Raster& raster, const Mesh& mesh, const View& view, const std::optional<CutPlane>& cut,
-               const PointColor& color, const PictureParams& params, int samples, const Context& context) {
-  return Shader(raster, mesh, view, cut, color, params, samples).run(context);
+               const PointColor& color, const PictureParams& params, int samples, double inset_mm,
+               const Context& context) {
+  return Shader(raster, mesh, view, cut, color, params, samples, inset_mm).run(context);
 }
 
 }  // namespace fibrolite

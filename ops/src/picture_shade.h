@@ -13,9 +13,10 @@
 
 namespace fibrolite {
 
-/// Light, occlusion, ground shadow and background; `samples` by `samples` of the raster make a pixel.
+/// Light, occlusion, ground shadow and background; `samples` by `samples` of the raster make a pixel. Colours of a
+/// surface are asked for `inset_mm` inside it.
 [[nodiscard]] RgbImage shade(const Raster& raster, const Mesh& mesh, const View& view,
                              const std::optional<CutPlane>& cut, const PointColor& color, const PictureParams& params,
-                             int samples, const Context& context);
+                             int samples, double inset_mm, const Context& context);
 
 }  // namespace fibrolite
