@@ -18,7 +18,7 @@
 namespace fibrolite {
 namespace {
 
-constexpr int section_side_px = 256;  // at most, for measuring a lumen
+constexpr int section_side_px = 160;  // at most, for measuring a lumen
 
 class Membranes final : public Shape::Function {
  public:

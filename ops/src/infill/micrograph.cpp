@@ -135,7 +135,7 @@ LabelImage to_labels(const cv::Mat& marker) {
 
 }  // namespace
 
-FibreMap find_fibres(const GrayImage& micrograph) {
+FibreMap find_fibres(const GrayImage& micrograph) try {
   if (micrograph.width < 16 || micrograph.height < 16) too_few(0);
   cv::Mat gray = even_light(micrograph);
   cv::Mat fibre;
@@ -177,6 +177,8 @@ FibreMap find_fibres(const GrayImage& micrograph) {
   map.mean_pitch_px = mean_pitch(map.label, cells);
   clear_membranes(map.label);
   return map;
+} catch (const cv::Exception& e) {
+  throw Error(Code::Internal, "image processing failed: " + e.err, "find_fibres");
 }
 
 GrayImage read_gray(const std::filesystem::path& path) {

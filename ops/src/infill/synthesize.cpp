@@ -102,7 +102,7 @@ void fill_pockets(FloatImage& distance, double least_depth_mm) {
 
 }  // namespace
 
-MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) {
+MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) try {
   check(map, params);
   const GrayImage texture = depth_texture(map);
   // The pitch of the quilted cells is known only afterwards, so there is a quarter more of them than asked for, and two
@@ -137,6 +137,8 @@ MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) {
   for (float& d : result.distance_mm.pixels) d -= static_cast<float>(half_wall);
   fill_pockets(result.distance_mm, 0.8 * least_void * params.fibre_mm);
   return result;
+} catch (const cv::Exception& e) {
+  throw Error(Code::Internal, "image processing failed: " + e.err, "synthesize");
 }
 
 }  // namespace fibrolite
