@@ -19,6 +19,7 @@
 #include "load.h"
 #include "locate.h"
 #include "part_maker.h"
+#include "voxel_tets.h"
 
 namespace fibrolite {
 namespace {
@@ -315,6 +316,17 @@ Extracted extract_component(const Proxy& proxy, const Partition& partition, int 
   }
 }
 
+/// The whole body as tetrahedra: TetGen's where it can, else the staircase of a coarse lattice, which never fails.
+TetMesh extract_body(const Proxy& proxy, int triangles, std::vector<std::string>& notes, const Context& context) {
+  try {
+    return extract(proxy, everything(), {.max_surface_triangles = triangles}, context);
+  } catch (const Error& error) {
+    if (error.code() != Code::SolverFailed) throw;
+    notes.push_back(std::string("the body is analysed on a coarse lattice of cubes: ") + error.what());
+    return voxel_tetrahedra(distance_to(proxy.solid), proxy.solid.bounds_mm(), proxy.solid.volume_mm3());
+  }
+}
+
 }  // namespace
 
 Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& given, const Material& material,
@@ -329,14 +341,14 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   const std::size_t count = partition.candidates.size();
   const bool alone = count == 1;
 
+  Verification result;
   // All meshes at once: the body's own, and one for each candidate.
   std::vector<Extracted> extracted(count);
   std::optional<TetMesh> body_mesh;
   std::atomic<int> done = 0;
   tbb::parallel_for(std::size_t{0}, alone ? std::size_t{1} : count + 1, [&](std::size_t job) {
     if (job == 0) {
-      body_mesh =
-          extract(proxy, everything(), {.max_surface_triangles = params.triangles}, context.part(0, 0, "verify"));
+      body_mesh = extract_body(proxy, params.triangles, result.notes, context.part(0, 0, "verify"));
     } else {
       extracted[job - 1] = extract_component(proxy, partition, static_cast<int>(job - 1), params.triangles,
                                              context.part(0, 0, "verify"));
@@ -344,7 +356,6 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     context.progress(0.4 * ++done / static_cast<double>(count + 1));
   });
 
-  Verification result;
   const Model body = solve_body(std::move(*body_mesh), params, setting, context.part(0.4, 0.65, "verify"));
   account(result, body, params.load_n);
   std::vector<double> body_von_mises;

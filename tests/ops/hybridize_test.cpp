@@ -1,1 +1,153 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/hybridize.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/tools/Composite.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "fibrolite/vdb.h"
+#include "models.h"
+
+namespace fibrolite {
+namespace {
+
+using testing::asset;
+
+/// The default recipe with members thick enough for a voxel of 0.5 mm.
+Recipe sturdy() {
+  Recipe recipe;
+  recipe.tcs.stick_mm = recipe.mfs.wall_mm = recipe.joint.column_mm = recipe.joint.min_wall_mm = 1.0;
+  recipe.mfs.fibre_mm = 3;
+  return recipe;
+}
+
+struct Outcome {
+  Hybrid hybrid;
+  Report report;
+};
+Outcome run(const Mesh& mesh, const HybridizeParams& params) {
+  const Model model = prepare({mesh, 1.0, {}}, {});
+  Outcome out;
+  out.hybrid = hybridize(model, params, out.report);
+  return out;
+}
+Mesh model(const std::string& name) { return read_mesh(asset(name)).mesh; }
+
+std::vector<std::string> kinds(const Report& report) {
+  std::vector<std::string> result;
+  for (const PartReport& p : report.parts) result.push_back(p.kind);
+  std::sort(result.begin(), result.end());
+  return result;
+}
+
+TEST(Hybridize, quadruped_has_fibres_in_its_legs_and_crystal_in_its_body_at_every_voxel) {
+  const Mesh mesh = model("quadruped");
+  const Outcome coarse = run(mesh, {.recipe = sturdy(), .voxel_mm = 0.5}),
+                fine = run(mesh, {.recipe = sturdy(), .voxel_mm = 0.25});
+
+  EXPECT_EQ(coarse.report.solid.pieces, 1);
+  EXPECT_GT(coarse.report.solid.fill_ratio, 0.1);
+  EXPECT_LT(coarse.report.solid.fill_ratio, 0.8);
+  int columns = 0;
+  for (const PartReport& p : coarse.report.parts) {
+    EXPECT_EQ(p.infill, p.kind == "column" ? "mfs" : "tcs");
+    EXPECT_GT(p.infill_volume_mm3, 0.05 * p.lumen_mm3);
+    if (p.kind != "column") continue;
+    ++columns;
+    EXPECT_GT(p.infill_volume_mm3, 0.15 * p.lumen_mm3);
+    EXPECT_GT(p.stress.dominance, 2);
+    EXPECT_TRUE(std::any_of(coarse.report.interfaces.begin(), coarse.report.interfaces.end(),
+                            [&](const InterfaceReport& i) { return i.a == p.id || i.b == p.id; }));
+  }
+  EXPECT_GE(columns, 4);
+  for (const InterfaceReport& i : coarse.report.interfaces) {
+    EXPECT_EQ(i.regions_after, 1);
+    EXPECT_LE(i.layer_area_mm2, 1.25 * (i.union_area_mm2 + i.bridge_area_mm2));
+  }
+
+  ASSERT_EQ(fine.report.parts.size(), coarse.report.parts.size());
+  for (std::size_t i = 0; i < fine.report.parts.size(); ++i) {
+    const PartReport &a = coarse.report.parts[i], &b = fine.report.parts[i];
+    EXPECT_EQ(a.kind, b.kind);
+    EXPECT_NEAR(a.volume_mm3 / b.volume_mm3, 1, 0.01);
+    EXPECT_LT(norm(a.centroid_mm - b.centroid_mm), 0.5);
+    EXPECT_EQ(a.fibres, b.fibres);
+  }
+  ASSERT_EQ(fine.hybrid.joints.size(), coarse.hybrid.joints.size());
+  for (std::size_t i = 0; i < fine.hybrid.joints.size(); ++i) {
+    const auto &a = coarse.hybrid.joints[i].columns, &b = fine.hybrid.joints[i].columns;
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t k = 0; k < a.size(); ++k) EXPECT_LT(norm(a[k].a - b[k].a), 1e-6);
+  }
+}
+
+TEST(Hybridize, a_turned_model_gives_the_same_parts) {
+  const Mesh mesh = model("cylinder_on_box");
+  const HybridizeParams upright{.recipe = sturdy(), .voxel_mm = 0.5};
+  const Outcome straight = run(mesh, upright);
+  for (const int axis : {0, 1, 2}) {
+    HybridizeParams turned = upright;
+    turned.recipe.verify.up = axis == 0 ? Vec3d{0, -1, 0} : axis == 1 ? Vec3d{1, 0, 0} : Vec3d{0, 0, 1};
+    turned.recipe.verify.azimuth_deg = 0;
+    const Outcome out = run(testing::turned(mesh, axis, 1), turned);
+    EXPECT_EQ(kinds(out.report), kinds(straight.report));
+    EXPECT_NEAR(out.report.solid.volume_mm3 / straight.report.solid.volume_mm3, 1, 0.01);
+  }
+}
+
+TEST(Hybridize, the_steps_united_by_openvdb_are_the_fused_solid) {
+  const Outcome out = run(model("cylinder_on_box"), {.recipe = sturdy(), .voxel_mm = 0.5, .steps = true});
+  std::map<std::string, Solid> step;
+  for (const NamedSolid& s : out.hybrid.steps) step.emplace(s.name, s.solid);
+  ASSERT_TRUE(step.contains("body") && step.contains("shell") && step.contains("fill_0") && step.contains("solid"));
+  ASSERT_TRUE(step.contains("joint_0"));
+  const auto united = to_vdb(step.at("shell"))->deepCopy();
+  for (const auto& [name, solid] : step) {
+    if (name == "body" || name == "shell" || name == "solid" || name == "specks") continue;
+    const auto operand = to_vdb(solid)->deepCopy();
+    openvdb::tools::csgUnion(*united, *operand);
+  }
+  if (step.contains("specks")) {
+    const auto operand = to_vdb(step.at("specks"))->deepCopy();
+    openvdb::tools::csgDifference(*united, *operand);
+  }
+  const auto fused = to_vdb(out.hybrid.solid);
+  const auto access = united->getConstAccessor();
+  const float near = 0.1F * 0.5F;
+  std::int64_t compared = 0, differ = 0;
+  for (auto value = fused->cbeginValueOn(); value; ++value) {
+    if (std::abs(*value) < near) continue;
+    ++compared;
+    differ += (access.getValue(value.getCoord()) < 0) != (*value < 0) ? 1 : 0;
+  }
+  EXPECT_GT(compared, 100000);
+  EXPECT_EQ(differ, 0);
+}
+
+TEST(Hybridize, the_molar_weighs_what_the_paper_says) {
+  const Mesh mesh = model("molar");
+  const auto mass = [&](InfillKind kind) {
+    return run(mesh, {.recipe = {}, .infill = kind, .voxel_mm = 0.4}).report.solid.mass_g;
+  };
+  const double tcs = mass(InfillKind::Tcs), hybrid = mass(InfillKind::Hybrid), mfs = mass(InfillKind::Mfs),
+               full = mass(InfillKind::Solid);
+  EXPECT_LT(tcs, hybrid);
+  EXPECT_LT(hybrid, mfs);
+  EXPECT_LT(mfs, full);
+  EXPECT_GT(hybrid / full, 0.30);  // the paper: 41.86 %
+  EXPECT_LT(hybrid / full, 0.55);
+}
+
+TEST(Hybridize, a_filled_body_is_the_model) {
+  const Mesh mesh = model("bracket");
+  const Outcome out = run(mesh, {.recipe = {}, .infill = InfillKind::Solid, .voxel_mm = 0.4});
+  EXPECT_NEAR(out.report.solid.volume_mm3 / signed_volume(mesh), 1, 0.005);
+  EXPECT_NEAR(out.report.solid.fill_ratio, 1, 1e-3);
+}
+
+}  // namespace
+}  // namespace fibrolite
