@@ -16,6 +16,8 @@ constexpr double disc_margin =
     1.3;  // a cut's disc covers the section on the coarse proxy; the true one may be a little wider
 constexpr int max_half_side_px = 1500;
 constexpr int least_px = 16;  // smaller sections are slits between sampling and the surface
+constexpr double least_share =
+    0.03;  // of the cut's largest section: slivers where the plane leaves the border of the parts
 
 bool column_first(const Parts& parts, const Cut& cut) {
   const auto kind = [&](int id) { return parts.parts[static_cast<std::size_t>(id)].kind(); };
@@ -57,9 +59,11 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
   };
   each([&](std::size_t r, Vec2d p) { center[r] = center[r] + (1.0 / static_cast<double>(found.pixels[r])) * p; });
   each([&](std::size_t r, Vec2d p) { reach[r] = std::max(reach[r], norm(p - center[r])); });
+  const std::int64_t largest = count == 0 ? 0 : *std::max_element(found.pixels.begin(), found.pixels.end());
+  const double least = std::max<double>(least_px, least_share * static_cast<double>(largest));
   std::vector<Interface> result;
   for (std::size_t r = 0; r < count; ++r) {
-    if (found.pixels[r] < least_px) continue;
+    if (static_cast<double>(found.pixels[r]) < least) continue;
     Interface section;
     section.a = cut.a;
     section.b = cut.b;

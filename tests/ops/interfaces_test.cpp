@@ -105,6 +105,13 @@ TEST(Interfaces, TwoLegsThroughOneDiscAreTwoSections) {
   EXPECT_LT(found[0].frame.origin.x, found[1].frame.origin.x) << "sorted by centroid";
 }
 
+TEST(Interfaces, ASliverBesideTheLimbIsNoInterface) {
+  const Shape legs = unite({limb, cylinder({-8, 0, -20}, {-8, 0, 20}, 0.5)});
+  const Parts parts =
+      parts_of({Kind::Column, Kind::Bulk}, halves([](double) { return 1; }, 2), {cut_at_origin(0, 1, 9)});
+  EXPECT_EQ(interfaces(parts, legs, 0.1).size(), 1U);
+}
+
 TEST(Interfaces, ALegOfAnotherPartInTheDiscIsNotTaken) {
   const Shape legs = unite({cylinder({-6, 0, -20}, {-6, 0, 20}, 3), cylinder({6, 0, -20}, {6, 0, 20}, 4)});
   const Labels labels = halves([](double x) { return x < 0 ? 1 : 2; }, 3);

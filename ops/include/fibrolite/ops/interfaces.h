@@ -18,7 +18,7 @@ struct Interface {
   double area_mm2 = 0;   ///< Of the body's section.
 };
 /// The sections of the body in the plane of one cut, where it parts cut.a from cut.b; sampled at `pixel_mm` (coarser
-/// for a disc wider than 3000 pixels). Sections below 16 pixels are left out.
+/// for a disc wider than 3000 pixels). Sections below 16 pixels or 3 % of the cut's largest are left out.
 [[nodiscard]] std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const Shape& body,
                                                  double pixel_mm);
 
