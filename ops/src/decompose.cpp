@@ -29,27 +29,35 @@ int most_frequent(const std::vector<std::int32_t>& samples, const std::vector<st
 }
 
 // Crumbs that a section leaves at its rim join the piece they hang on by the body's own links.
-void absorb_crumbs(const VoxelBody& body, Components& c) {
+void absorb_crumbs(const Anatomy& anatomy, double min_area, Components& c) {
+  const VoxelBody& body = anatomy.body;
+  constexpr std::size_t least_samples = 20;
   std::vector<std::size_t> size(static_cast<std::size_t>(c.count), 0);
   for (const std::int32_t id : c.of) ++size[static_cast<std::size_t>(id)];
-  const std::size_t least = std::max<std::size_t>(20, body.count() / 5000);
-  const std::size_t largest = *std::max_element(size.begin(), size.end());
+  std::vector<double> area(size.size(), 0);
+  for (std::size_t f = 0; f < anatomy.sample_of_face.size(); ++f)
+    area[static_cast<std::size_t>(c.of[static_cast<std::size_t>(anatomy.sample_of_face[f])])] +=
+        anatomy.graph.area_mm2[f];
+  const auto main = std::max_element(size.begin(), size.end()) - size.begin();
+  std::vector<std::uint8_t> is_crumb(size.size(), 0);
+  for (std::size_t i = 0; i < size.size(); ++i)
+    is_crumb[i] = size[i] < least_samples || area[i] < min_area * anatomy.graph.total_area_mm2 ? 1 : 0;
+  is_crumb[static_cast<std::size_t>(main)] = 0;
   std::map<int, std::map<int, std::size_t>> hangs_on;
   for (std::size_t s = 0; s < c.of.size(); ++s) {
     const std::int32_t id = c.of[s];
-    if (size[static_cast<std::size_t>(id)] >= std::min(least, largest)) continue;
+    if (is_crumb[static_cast<std::size_t>(id)] == 0) continue;
     auto& around = hangs_on[id];
     for (int d = 0; d < VoxelBody::directions; ++d) {
       if ((body.links[s] >> static_cast<unsigned>(d) & 1U) == 0) continue;
       const std::int32_t n = c.of[static_cast<std::size_t>(body.neighbour(static_cast<std::int32_t>(s), d))];
-      if (size[static_cast<std::size_t>(n)] >= std::min(least, largest)) ++around[n];
+      if (is_crumb[static_cast<std::size_t>(n)] == 0) ++around[n];
     }
   }
-  const int main = static_cast<int>(std::max_element(size.begin(), size.end()) - size.begin());
   std::vector<int> into(static_cast<std::size_t>(c.count));
   for (int i = 0; i < c.count; ++i) into[static_cast<std::size_t>(i)] = i;
   for (const auto& [crumb, around] : hangs_on) {
-    int host = main;
+    int host = static_cast<int>(main);
     std::size_t most = 0;
     for (const auto& [id, links] : around) {
       if (links <= most) continue;
@@ -88,8 +96,7 @@ struct Verdict {
 };
 
 Verdict judge(const Anatomy& anatomy, const CutPieces& pieces, const std::vector<std::size_t>& size,
-              const std::vector<double>& share, const std::vector<std::int32_t>& samples, double min_area,
-              double min_slenderness) {
+              const std::vector<std::int32_t>& samples, double min_slenderness) {
   Verdict v;
   v.piece = most_frequent(samples, pieces.of);
   const auto p = static_cast<std::size_t>(v.piece);
@@ -100,17 +107,18 @@ Verdict judge(const Anatomy& anatomy, const CutPieces& pieces, const std::vector
     v.why_not = "no plane cuts it off";
     return v;
   }
-  if (share[p] < min_area) {
-    v.why_not = "its share of the surface is only " + number_text(100 * share[p], 2) + " %";
-    return v;
-  }
   const LimbPiece piece = pieces.piece(anatomy, v.piece);
   if (piece.faces.empty()) {
     v.why_not = "no plane cuts it off";
     return v;
   }
-  const double slenderness = quick_slenderness(anatomy.body, pieces.links, piece);
-  if (slenderness < min_slenderness) v.why_not = "it is only " + number_text(slenderness, 3) + " times as long as wide";
+  const QuickShape shape = quick_shape(anatomy.body, pieces.links, piece);
+  if (shape.slenderness < min_slenderness) {
+    v.why_not = "it is only " + number_text(shape.slenderness, 3) + " times as long as wide";
+  } else if (shape.width_mm > flattest_limb * piece.diameter_mm) {
+    v.why_not = "it is flat: " + number_text(shape.width_mm, 3) + " mm wide, " + number_text(piece.diameter_mm, 3) +
+                " mm thick";
+  }
   return v;
 }
 
@@ -158,7 +166,7 @@ LimbPiece CutPieces::piece(const Anatomy& anatomy, int id) const {
   return p;
 }
 
-CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts) {
+CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts, double min_area) {
   const VoxelBody& body = anatomy.body;
   CutPieces result;
   for (;;) {
@@ -166,7 +174,7 @@ CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts) {
     result.links = body.links;
     for (const Section& cut : cuts) result.severed.push_back(sever(body, cut, result.links));
     Components c = components(body, result.links);
-    absorb_crumbs(body, c);
+    absorb_crumbs(anatomy, min_area, c);
     std::vector<Section> separating;
     for (std::size_t i = 0; i < cuts.size(); ++i) {
       const int near = most_frequent(result.severed[i].near, c.of);
@@ -183,15 +191,6 @@ CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts) {
     }
     cuts = std::move(separating);
   }
-}
-
-std::vector<double> area_shares(const Anatomy& anatomy, const CutPieces& pieces) {
-  std::vector<double> share(static_cast<std::size_t>(pieces.count), 0);
-  for (std::size_t f = 0; f < anatomy.sample_of_face.size(); ++f) {
-    const std::int32_t id = pieces.of[static_cast<std::size_t>(anatomy.sample_of_face[f])];
-    share[static_cast<std::size_t>(id)] += anatomy.graph.area_mm2[f] / anatomy.graph.total_area_mm2;
-  }
-  return share;
 }
 
 Limbs find_limbs(const Anatomy& anatomy, double threshold, double min_area, double min_slenderness) {
@@ -219,16 +218,15 @@ Limbs find_limbs(const Anatomy& anatomy, double threshold, double min_area, doub
     std::vector<Section> cuts;
     for (const RegionCuts& candidate : candidates)
       cuts.insert(cuts.end(), candidate.cuts.begin(), candidate.cuts.end());
-    limbs.pieces = cut_body(anatomy, std::move(cuts));
+    limbs.pieces = cut_body(anatomy, std::move(cuts), min_area);
     limbs.limb.assign(static_cast<std::size_t>(limbs.pieces.count), 0);
     limbs.count = 0;
     std::vector<std::size_t> size(static_cast<std::size_t>(limbs.pieces.count), 0);
     for (const std::int32_t id : limbs.pieces.of) ++size[static_cast<std::size_t>(id)];
-    const std::vector<double> share = area_shares(anatomy, limbs.pieces);
     std::vector<RegionCuts> kept;
     for (RegionCuts& candidate : candidates) {
       const auto r = static_cast<std::size_t>(candidate.region);
-      const Verdict v = judge(anatomy, limbs.pieces, size, share, samples[r], min_area, min_slenderness);
+      const Verdict v = judge(anatomy, limbs.pieces, size, samples[r], min_slenderness);
       if (v.why_not.empty()) {
         limbs.limb[static_cast<std::size_t>(v.piece)] = 1;
         ++limbs.count;

@@ -36,11 +36,11 @@ struct CutPieces {
 
   [[nodiscard]] LimbPiece piece(const Anatomy& anatomy, int id) const;
 };
-/// Cuts that do not separate are dropped, crumbs go to the piece they hang on.
-[[nodiscard]] CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts);
+/// Cuts that do not separate are dropped; crumbs (below `min_area` of the surface) go to the piece they hang on.
+[[nodiscard]] CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts, double min_area);
 
-/// Share of the surface that belongs to each piece.
-[[nodiscard]] std::vector<double> area_shares(const Anatomy& anatomy, const CutPieces& pieces);
+/// A limb wider than this many times its thickness is a sheet, and fibres along it would bear nothing across.
+inline constexpr double flattest_limb = 2.5;
 
 struct Limbs {
   CutPieces pieces;
@@ -48,7 +48,7 @@ struct Limbs {
   int count = 0;
   std::vector<std::string> notes;
 };
-/// Thin regions at a threshold that a plane cuts off cleanly and that are longer than wide.
+/// Thin regions at a threshold that a plane cuts off cleanly and that are longer than wide and not flat.
 [[nodiscard]] Limbs find_limbs(const Anatomy& anatomy, double threshold, double min_area, double min_slenderness);
 
 }  // namespace fibrolite

@@ -12,6 +12,7 @@ struct Edge {
   std::uint64_t key;  // both corners, the lower one first
   std::uint32_t face;
   std::uint32_t side;
+  bool forward;  // runs from the lower corner to the higher
 };
 
 }  // namespace
@@ -39,20 +40,30 @@ FaceGraph make_face_graph(const Mesh& mesh) {
     for (std::uint32_t side = 0; side < 3; ++side) {
       const std::uint64_t u = t[side];
       const std::uint64_t v = t[(side + 1) % 3];
-      edges.push_back({std::min(u, v) << 32 | std::max(u, v), static_cast<std::uint32_t>(f), side});
+      edges.push_back({std::min(u, v) << 32 | std::max(u, v), static_cast<std::uint32_t>(f), side, u < v});
     }
   }
   std::sort(edges.begin(), edges.end(),
             [](const Edge& a, const Edge& b) { return a.key != b.key ? a.key < b.key : a.face < b.face; });
-  for (std::size_t i = 0; i < edges.size(); i += 2) {
-    const bool pair = i + 1 < edges.size() && edges[i].key == edges[i + 1].key;
-    const bool third = i + 2 < edges.size() && edges[i].key == edges[i + 2].key;
-    if (!pair || third) {
-      throw Error(Code::BadInput, "the surface is open or not a 2-manifold", "face " + std::to_string(edges[i].face),
-                  "measure diameters on the surface of a solid");
+  for (std::size_t first = 0; first < edges.size();) {
+    std::size_t last = first;
+    while (last < edges.size() && edges[last].key == edges[first].key) ++last;
+    // Sheets that touch along an edge have four faces or more there: any two that run oppositely are neighbours.
+    const auto turns = std::stable_partition(edges.begin() + static_cast<std::ptrdiff_t>(first),
+                                             edges.begin() + static_cast<std::ptrdiff_t>(last),
+                                             [](const Edge& e) { return e.forward; });
+    const std::size_t forward = static_cast<std::size_t>(turns - edges.begin()) - first;
+    if (2 * forward != last - first) {
+      throw Error(Code::BadInput, "the surface is open or its triangles face both ways",
+                  "face " + std::to_string(edges[first].face), "measure diameters on the surface of a solid");
     }
-    graph.neighbours[edges[i].face][edges[i].side] = edges[i + 1].face;
-    graph.neighbours[edges[i + 1].face][edges[i + 1].side] = edges[i].face;
+    for (std::size_t i = 0; i < forward; ++i) {
+      const Edge& a = edges[first + i];
+      const Edge& b = edges[first + forward + i];
+      graph.neighbours[a.face][a.side] = b.face;
+      graph.neighbours[b.face][b.side] = a.face;
+    }
+    first = last;
   }
   return graph;
 }

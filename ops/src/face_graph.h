@@ -21,7 +21,7 @@ struct FaceGraph {
   [[nodiscard]] std::size_t size() const { return neighbours.size(); }
 };
 
-/// @throws Error BadInput: no triangles, or an edge that does not have exactly two.
+/// @throws Error BadInput: no triangles, or an edge whose triangles do not run to and fro equally often.
 [[nodiscard]] FaceGraph make_face_graph(const Mesh& mesh);
 
 }  // namespace fibrolite

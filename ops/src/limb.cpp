@@ -248,13 +248,14 @@ LimbShape limb_shape(const VoxelBody& body, const Links& links, const LimbPiece&
   return shape;
 }
 
-double quick_slenderness(const VoxelBody& body, const Links& links, const LimbPiece& piece) {
+QuickShape quick_shape(const VoxelBody& body, const Links& links, const LimbPiece& piece) {
   const std::vector<float> way = geodesic(body, links, piece.faces.front(), anywhere);
   const std::vector<double> value(way.begin(), way.end());
   const bool other_cut = piece.faces.size() > 1;
   const CentreLine line =
       centre_line(body, by_value(piece.samples, value), largest(piece.samples, way), false, true, other_cut);
-  return line.width_mm > 0 ? line.length_mm / line.width_mm - (other_cut ? 0 : 0.5) : 0;
+  if (line.width_mm <= 0) return {};
+  return {line.length_mm / line.width_mm - (other_cut ? 0 : 0.5), line.width_mm};
 }
 
 }  // namespace fibrolite

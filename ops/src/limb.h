@@ -39,8 +39,11 @@ struct LimbShape {
 [[nodiscard]] LimbShape limb_shape(const VoxelBody& body, const Links& links, const LimbPiece& piece,
                                    double least_slenderness, const Context& context);
 
-/// Slenderness from geodesic distances to its first cut alone; quick. The piece must have a cut.
-[[nodiscard]] double quick_slenderness(const VoxelBody& body, const Links& links, const LimbPiece& piece);
+/// From geodesic distances to its first cut alone; quick. The piece must have a cut.
+struct QuickShape {
+  double slenderness = 0, width_mm = 0;
+};
+[[nodiscard]] QuickShape quick_shape(const VoxelBody& body, const Links& links, const LimbPiece& piece);
 
 /// A straight axis along the longest principal axis.
 [[nodiscard]] Axis principal_axis(const VoxelBody& body, const std::vector<std::int32_t>& samples);

@@ -18,9 +18,10 @@ namespace {
 
 constexpr double sweep_from = 0.15;
 constexpr double sweep_step = 0.025;
-constexpr int sweep_count = 29;          // up to 0.85
+constexpr int sweep_count = 25;          // up to 0.75: above it nearly everything is thin
 constexpr double same_next = 0.75;       // overlap of a limb at one threshold with itself at the next
 constexpr double same_over_range = 0.6;  // and with itself at the first threshold of the range
+constexpr std::size_t least_range = 3;   // thresholds in a row: fewer are chance
 constexpr double even_diameters = 1.5;   // 90th over 10th percentile: below this a threshold only sorts noise
 
 double threshold_at(std::size_t step) { return sweep_from + sweep_step * static_cast<double>(step); }
@@ -86,7 +87,8 @@ struct Choice {
   bool found = false;
 };
 
-// The partition that stays the same over the widest range of thresholds; of its range the middle.
+// The partition whose limbs persist longest, summed over them: limbs times the range of thresholds over which they stay
+// the same. Of its range the middle.
 Choice most_stable(const Anatomy& anatomy, const PartitionParams& params, const Context& context) {
   std::vector<Limbs> sweep(sweep_count);
   tbb::parallel_for(0, sweep_count, [&](int i) {
@@ -97,22 +99,23 @@ Choice most_stable(const Anatomy& anatomy, const PartitionParams& params, const 
   });
   std::size_t best_first = 0;
   std::size_t best_last = 0;
-  bool found = false;
+  std::size_t best_score = 0;
   for (std::size_t first = 0; first < sweep.size(); ++first) {
-    if (sweep[first].count == 0) continue;
     std::size_t last = first;
     while (last + 1 < sweep.size() && same_limbs(sweep[last], sweep[last + 1], same_next) &&
            same_limbs(sweep[first], sweep[last + 1], same_over_range))
       ++last;
-    // Of two ranges of the same width the one with the higher thresholds has the larger limbs.
-    if (!found || last - first >= best_last - best_first) {
-      found = true;
-      best_first = first;
-      best_last = last;
-    }
+    const std::size_t range = last - first + 1;
+    if (range < least_range) continue;
+    // Of equals the one with the higher thresholds has the larger limbs.
+    const std::size_t score = range * static_cast<std::size_t>(sweep[first].count);
+    if (score == 0 || score < best_score) continue;
+    best_score = score;
+    best_first = first;
+    best_last = last;
   }
   Choice choice;
-  if (!found) return choice;
+  if (best_score == 0) return choice;
   const std::size_t middle = (best_first + best_last + 1) / 2;
   choice.threshold = threshold_at(middle);
   choice.stable_from = threshold_at(best_first);
@@ -122,9 +125,9 @@ Choice most_stable(const Anatomy& anatomy, const PartitionParams& params, const 
   return choice;
 }
 
-Choice whole_body(const Anatomy& anatomy) {
+Choice whole_body(const Anatomy& anatomy, double min_area) {
   Choice choice;
-  choice.limbs.pieces = cut_body(anatomy, {});
+  choice.limbs.pieces = cut_body(anatomy, {}, min_area);
   choice.limbs.limb.assign(static_cast<std::size_t>(choice.limbs.pieces.count), 0);
   return choice;
 }
@@ -162,46 +165,23 @@ bool contains(const std::vector<Section>& list, const Section& cut) {
   });
 }
 
-// A branching limb is parted into its branches; a new piece too small or too stout to be a limb stays with its
-// neighbour.
+// A branching limb is parted into its branches; what would be too small stays with its neighbour.
 CutPieces split_branches(const Anatomy& anatomy, CutPieces pieces, const std::vector<std::uint8_t>& limb_sample,
-                         const PartitionParams& params, const Context& context) {
-  constexpr int rounds = 4;
+                         double min_area, const Context& context) {
+  constexpr int rounds = 4;  // a branch may branch again
   for (int round = 0; round < rounds; ++round) {
     const std::vector<std::uint8_t> limb = limb_pieces(pieces, limb_sample);
-    const std::vector<Section> before = pieces.cuts;
-    std::vector<Section> extra;
+    std::vector<Section> cuts = pieces.cuts;
     for (int id = 0; id < pieces.count; ++id) {
       context.check();
       if (limb[static_cast<std::size_t>(id)] == 0) continue;
-      std::vector<Split> cuts = branch_cuts(anatomy.body, pieces.links, pieces.piece(anatomy, id));
-      extra.insert(extra.end(), std::make_move_iterator(cuts.begin()), std::make_move_iterator(cuts.end()));
+      std::vector<Split> found = branch_cuts(anatomy.body, pieces.links, pieces.piece(anatomy, id));
+      cuts.insert(cuts.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
     }
-    if (extra.empty()) return pieces;
-    const std::size_t had = before.size();
-    bool added = false;
-    for (;;) {
-      std::vector<Section> all = before;
-      all.insert(all.end(), extra.begin(), extra.end());
-      CutPieces next = cut_body(anatomy, all);
-      const std::vector<double> share = area_shares(anatomy, next);
-      // Which of the new cuts part off a piece that is too small?
-      std::vector<Section> kept;
-      for (std::size_t c = 0; c < next.cuts.size(); ++c) {
-        const bool old = contains(before, next.cuts[c]);
-        if (old) continue;
-        const double smaller = std::min(share[static_cast<std::size_t>(next.sides[c][0])],
-                                        share[static_cast<std::size_t>(next.sides[c][1])]);
-        if (smaller >= params.min_area) kept.push_back(next.cuts[c]);
-      }
-      if (kept.size() == extra.size() || kept.empty()) {
-        added = !kept.empty();
-        if (added) pieces = std::move(next);
-        break;
-      }
-      extra = std::move(kept);
-    }
-    if (!added || pieces.cuts.size() == had) return pieces;
+    if (cuts.size() == pieces.cuts.size()) break;
+    CutPieces next = cut_body(anatomy, std::move(cuts), min_area);
+    if (next.cuts.size() <= pieces.cuts.size()) break;
+    pieces = std::move(next);
   }
   return pieces;
 }
@@ -223,43 +203,46 @@ std::vector<double> piece_volumes(const Anatomy& anatomy, const CutPieces& piece
   return volume;
 }
 
-Candidate describe(const Anatomy& anatomy, const CutPieces& pieces, int id, bool may_be_limb, double volume,
-                   const PartitionParams& params, const Context& context) {
+Candidate describe(const Anatomy& anatomy, const CutPieces& pieces, int id, bool may_be_limb, double least_slenderness,
+                   double volume, const Context& context) {
   const LimbPiece piece = pieces.piece(anatomy, id);
   Candidate c;
   c.volume_mm3 = volume;
   c.diameter_mm = piece.diameter_mm;
   for (const std::int32_t s : piece.samples) c.centroid_mm = c.centroid_mm + anatomy.body.position(s);
   c.centroid_mm = c.centroid_mm / static_cast<double>(piece.samples.size());
-  if (may_be_limb) {
-    const LimbShape shape = limb_shape(anatomy.body, pieces.links, piece, params.min_slenderness, context);
-    const double slenderness = shape.slenderness();
-    c.column_like = slenderness >= params.min_slenderness;
-    c.reason = std::string(shape.ring ? "a ring " : "a limb ") + number_text(shape.length_mm, 3) + " mm long and " +
-               number_text(shape.width_mm, 3) + " mm wide (slenderness " + number_text(slenderness, 3) +
-               (c.column_like ? ", at least " : ", below ") + number_text(params.min_slenderness, 3) + ")";
-    if (c.column_like) {
-      c.axis = shape.axis;
-      c.length_mm = shape.length_mm;
-      return c;
-    }
-  } else {
-    c.reason = "thick: median diameter " + number_text(c.diameter_mm, 3) + " mm";
-  }
   c.axis = principal_axis(anatomy.body, piece.samples);
   c.length_mm = c.axis.length_mm();
+  if (!may_be_limb) {
+    c.reason = "thick: median diameter " + number_text(c.diameter_mm, 3) + " mm";
+    return c;
+  }
+  const LimbShape shape = limb_shape(anatomy.body, pieces.links, piece, least_slenderness, context);
+  const double slenderness = shape.slenderness();
+  const bool flat = shape.width_mm > flattest_limb * piece.diameter_mm;
+  const bool slender = slenderness >= least_slenderness;
+  c.column_like = slender && !flat;
+  c.reason = std::string(shape.ring ? "a ring " : "a limb ") + number_text(shape.length_mm, 3) + " mm long, " +
+             number_text(shape.width_mm, 3) + " mm wide, " + number_text(piece.diameter_mm, 3) + " mm thick: " +
+             (flat      ? "flat"
+              : slender ? "slender"
+                        : "stout") +
+             " (slenderness " + number_text(slenderness, 3) + ", limit " + number_text(least_slenderness, 3) + ")";
+  if (!c.column_like) return c;
+  c.axis = shape.axis;
+  c.length_mm = shape.length_mm;
   return c;
 }
 
 std::vector<Described> describe_all(const Anatomy& anatomy, const CutPieces& pieces,
-                                    const std::vector<std::uint8_t>& limb_sample, const PartitionParams& params,
+                                    const std::vector<std::uint8_t>& limb_sample, double least_slenderness,
                                     const Context& context) {
   const std::vector<std::uint8_t> may_be_limb = limb_pieces(pieces, limb_sample);
   const std::vector<double> volume = piece_volumes(anatomy, pieces);
   std::vector<Described> described(static_cast<std::size_t>(pieces.count));
   tbb::parallel_for(0, pieces.count, [&](int id) {
     const auto i = static_cast<std::size_t>(id);
-    described[i] = {describe(anatomy, pieces, id, may_be_limb[i] != 0, volume[i], params, context), id};
+    described[i] = {describe(anatomy, pieces, id, may_be_limb[i] != 0, least_slenderness, volume[i], context), id};
   });
   return described;
 }
@@ -280,7 +263,7 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   Choice choice;
   const double ratio = diameter_ratio(anatomy);
   if (ratio < even_diameters) {
-    choice = whole_body(anatomy);
+    choice = whole_body(anatomy, params.min_area);
     result.notes.push_back("the diameters hardly differ (90th over 10th percentile " + number_text(ratio, 3) +
                            "): the model is parted by its branches alone");
   } else if (params.threshold) {
@@ -289,7 +272,7 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   } else {
     choice = most_stable(anatomy, params, context);
     if (!choice.found) {
-      choice = whole_body(anatomy);
+      choice = whole_body(anatomy, params.min_area);
       result.notes.push_back("no threshold from " + number_text(sweep_from) + " to " +
                              number_text(threshold_at(sweep_count - 1)) + " cuts off a limb");
     }
@@ -302,8 +285,10 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
 
   const std::vector<std::uint8_t> limb_sample = limb_samples(choice.limbs);
   const std::vector<Section> by_threshold = choice.limbs.pieces.cuts;
-  CutPieces pieces = split_branches(anatomy, std::move(choice.limbs.pieces), limb_sample, params, context);
-  std::vector<Described> described = describe_all(anatomy, pieces, limb_sample, params, context);
+  // A body of uneven thickness without limbs is a lump until it is clearly drawn out.
+  const double least_slenderness = params.min_slenderness * (by_threshold.empty() && ratio >= even_diameters ? 2 : 1);
+  CutPieces pieces = split_branches(anatomy, std::move(choice.limbs.pieces), limb_sample, params.min_area, context);
+  std::vector<Described> described = describe_all(anatomy, pieces, limb_sample, least_slenderness, context);
   for (;;) {
     // A fork between lumps that no fibre could run through: parting them gains nothing.
     std::vector<Section> kept;
@@ -313,8 +298,8 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
       if (column || contains(by_threshold, pieces.cuts[c])) kept.push_back(pieces.cuts[c]);
     }
     if (kept.size() == pieces.cuts.size()) break;
-    pieces = cut_body(anatomy, std::move(kept));
-    described = describe_all(anatomy, pieces, limb_sample, params, context);
+    pieces = cut_body(anatomy, std::move(kept), params.min_area);
+    described = describe_all(anatomy, pieces, limb_sample, least_slenderness, context);
   }
   context.progress(0.8);
   // Largest first: an order that turns with the model.
