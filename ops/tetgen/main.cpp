@@ -46,8 +46,9 @@ bool write_all(int file, const void* data, std::size_t size) {
   return true;
 }
 
-bool limit(int resource, std::uint64_t value) {
-  const rlimit both{value, value};
+/// A process that reaches the soft limit of processor time is told so by SIGXCPU; at the hard one it is just killed.
+bool limit(int resource, std::uint64_t value, std::uint64_t grace = 0) {
+  const rlimit both{value, value + grace};
   return setrlimit(static_cast<__rlimit_resource>(resource), &both) == 0;
 }
 
@@ -120,7 +121,7 @@ int main(int argc, char** argv) {
     if (argument == "--cpu-s" || argument == "--memory-mb") {
       const std::uint64_t value = ++i < argc ? std::strtoull(argv[i], nullptr, 10) : 0;
       const bool cpu = argument == "--cpu-s";
-      if (value == 0 || !limit(cpu ? RLIMIT_CPU : RLIMIT_AS, cpu ? value : value << 20)) return usage_error;
+      if (value == 0 || !(cpu ? limit(RLIMIT_CPU, value, 1) : limit(RLIMIT_AS, value << 20))) return usage_error;
     } else if (switches.empty() && !argument.empty() && argument[0] != '-') {
       switches = argument;
     } else {

@@ -1,1 +1,386 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/verify.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "component_stress.h"
+#include "fibrolite/error.h"
+#include "fibrolite/ops/tetrahedralize.h"
+#include "fibrolite/random.h"
+#include "fibrolite/realize.h"
+#include "fibrolite/surface.h"
+#include "label_field.h"
+#include "load.h"
+#include "locate.h"
+#include "models.h"
+
+namespace fibrolite {
+namespace {
+
+using ::testing::HasSubstr;
+
+Proxy proxy_of(const Shape& shape, const Box3d& box, double voxel_mm) {
+  Proxy proxy;
+  proxy.solid = realize(shape, box, Grid{.voxel_mm = voxel_mm});
+  proxy.surface = surface(proxy.solid);
+  return proxy;
+}
+
+/// Candidate 0 where `side` is negative, 1 where it is positive.
+Labels cut_by(const Box3d& box, const std::function<double(Vec3d)>& side) {
+  const double h = box.longest_side() / 64;
+  LabelSamples s{.origin = box.min, .voxel_mm = h, .size = {}, .count = 2, .clamp_mm = 6 * h, .label = {}, .near = {}};
+  const auto steps = [&](double length) { return static_cast<std::int32_t>(std::ceil(length / h)) + 1; };
+  s.size = {steps(box.size().x), steps(box.size().y), steps(box.size().z)};
+  for (int k = 0; k < s.size.z; ++k) {
+    for (int j = 0; j < s.size.y; ++j) {
+      for (int i = 0; i < s.size.x; ++i) {
+        const double d = side(box.min + h * Vec3d{double(i), double(j), double(k)});
+        const auto sample = static_cast<std::int64_t>(s.label.size());
+        s.label.push_back(d < 0 ? 0 : 1);
+        if (std::abs(d) < s.clamp_mm) s.near.push_back({sample, 0, 1, static_cast<float>(std::abs(d))});
+      }
+    }
+  }
+  return make_labels(s);
+}
+
+/// The model of most tests: a box with a cylinder on it, cut apart where they meet, in any position.
+struct CylinderOnBox {
+  static constexpr double radius = 8, foot = 20, top = 80;
+  Proxy proxy;
+  Partition partition;
+
+  explicit CylinderOnBox(const Frame& frame = {}, bool axis_across = false) {
+    const Shape shape = placed(
+        unite({cuboid({{-25, -25, 0}, {25, 25, foot}}), cylinder({0, 0, foot - 2}, {0, 0, top}, radius)}), frame);
+    Box3d box;
+    for (const double x : {-25.0, 25.0}) {
+      for (const double y : {-25.0, 25.0}) {
+        for (const double z : {0.0, top}) box.include(frame.to_world({x, y, z}));
+      }
+    }
+    box = box.grown(6);
+    proxy = proxy_of(shape, box, 1.37);
+    partition.labels = cut_by(box, [&](Vec3d p) { return frame.to_local(p).z - foot; });
+    const auto world = [&](double x, double z) { return frame.to_world({x, 0, z}); };
+    const double area = std::numbers::pi * radius * radius;
+    Candidate slab{.id = 0,
+                   .column_like = false,
+                   .volume_mm3 = 50 * 50 * foot,
+                   .centroid_mm = world(0, 10),
+                   .diameter_mm = 20,
+                   .length_mm = foot,
+                   .axis = Axis::straight(world(0, 0), world(0, foot)),
+                   .reason = "thick"};
+    Candidate post{.id = 1,
+                   .column_like = true,
+                   .volume_mm3 = area * (top - foot),
+                   .centroid_mm = world(0, 50),
+                   .diameter_mm = 16,
+                   .length_mm = top - foot,
+                   .axis = axis_across ? Axis::straight(world(-8, 50), world(8, 50))
+                                       : Axis::straight(world(0, foot), world(0, top)),
+                   .reason = "thin"};
+    partition.candidates = {slab, post};
+    Cut cut{.a = 1, .b = 0, .frame = frame_along(world(0, foot), world(0, 0) - world(0, 1)), .radius_mm = radius};
+    partition.cuts = {cut};
+  }
+};
+
+/// Coarser than the default, for speed.
+constexpr int triangles = 3000;
+
+/// The upright model at the default load, solved once.
+const Verification& upright() {
+  static const Verification result = [] {
+    const CylinderOnBox model;
+    return verify(model.proxy, model.partition, {.triangles = triangles});
+  }();
+  return result;
+}
+
+TEST(Verify, AnAxiallyLoadedCylinderIsAColumn) {
+  const CylinderOnBox model;
+  const Verification& v = upright();
+  ASSERT_EQ(v.parts.parts.size(), 2U);
+  EXPECT_EQ(v.part_of_candidate, (std::vector<int>{0, 1}));
+  EXPECT_EQ(v.parts.parts[0].kind(), Kind::Bulk);
+  const Part& post = v.parts.parts[1];
+  EXPECT_EQ(post.kind(), Kind::Column) << post.reason();
+  EXPECT_GT(post.stress().dominance, 3) << post.reason();
+  EXPECT_THAT(post.reason(), HasSubstr("column"));
+  EXPECT_TRUE(v.notes.empty()) << v.notes.front();
+  EXPECT_LT(v.residual, 1e-9);
+  EXPECT_LT(v.equilibrium, 1e-6);
+  ASSERT_EQ(v.parts.cuts.size(), 1U);
+  EXPECT_EQ(v.parts.cuts[0].a, 1);
+  // Every part's box holds its surface, and the labels are the parts'.
+  for (const Vec3f& vertex : model.proxy.surface.vertices) {
+    const Vec3d p = to_double(vertex);
+    const auto id = static_cast<std::size_t>(v.parts.labels.label(p));
+    EXPECT_TRUE(v.parts.parts[id].bounds_mm().contains(p));
+  }
+  EXPECT_LT(v.parts.parts[1].region()({0, 0, 60}), 0);
+  EXPECT_GT(v.parts.parts[1].region()({0, 0, 10}), 0);
+}
+
+TEST(Verify, StressOfAPressedPostIsForceOverArea) {
+  // All of the load on the post's end face. Straight down it is F / A everywhere; slanting it bends the post as a
+  // cantilever. Which of the two is reported (the one with the smaller dominance) depends on what little runs across.
+  const CylinderOnBox model;
+  VerifyParams params{.triangles = triangles};
+  params.load_box_mm = Box3d{{-10, -10, 75}, {10, 10, 90}};
+  const Part& post = verify(model.proxy, model.partition, params).parts.parts[1];
+  const double area = std::numbers::pi * 64, length = 60;
+  const double straight = 1000 / area;
+  // Mean |M y / I| over a round section is 4 r / (3 pi) M / I; M falls linearly to the tip.
+  const double slanting = 1000 * std::numbers::sqrt2 / 2;
+  const double bending =
+      slanting * length / 2 * 4 * 8 / (3 * std::numbers::pi) / (std::numbers::pi * 8 * 8 * 8 * 8 / 4);
+  const double axial = post.stress().axial;
+  EXPECT_LT(std::min(std::abs(axial - straight) / straight, std::abs(axial - bending) / bending), 0.05)
+      << axial << " against " << straight << " or " << bending;
+}
+
+TEST(Verify, ACylinderWithoutLoadIsBulk) {
+  const CylinderOnBox model;
+  VerifyParams params{.triangles = triangles};
+  params.load_box_mm = Box3d{{14, -30, 0}, {30, 30, 25}};  // the box's own top, beside the cylinder
+  const Verification v = verify(model.proxy, model.partition, params);
+  ASSERT_EQ(v.parts.parts.size(), 1U);
+  EXPECT_EQ(v.parts.parts[0].kind(), Kind::Bulk);
+  EXPECT_TRUE(v.parts.cuts.empty());
+  EXPECT_EQ(v.part_of_candidate, (std::vector<int>{0, 0}));
+  EXPECT_EQ(v.parts.labels.label({0, 0, 70}), 0);
+  EXPECT_THAT(v.parts.parts[0].reason(), HasSubstr("2 touching bulk pieces"));
+}
+
+TEST(Verify, TheFemDecidesNotTheShape) {
+  const CylinderOnBox model({}, true);  // the same body, but the post's axis is said to run across it
+  const Verification v = verify(model.proxy, model.partition, {.triangles = triangles});
+  EXPECT_EQ(v.parts.parts.size(), 1U);
+  EXPECT_EQ(v.parts.parts[0].kind(), Kind::Bulk);
+  VerifyParams paper{.triangles = triangles};
+  paper.world_axes = true;  // x, y, z know nothing of the axis: z dominates
+  EXPECT_EQ(verify(model.proxy, model.partition, paper).parts.parts.size(), 2U);
+}
+
+TEST(Verify, TenTimesTheForceDecidesTheSame) {
+  const CylinderOnBox model;
+  VerifyParams params{.triangles = triangles};
+  const Verification& one = upright();
+  params.load_n *= 10;
+  const Verification ten = verify(model.proxy, model.partition, params);
+  ASSERT_EQ(one.parts.parts.size(), ten.parts.parts.size());
+  for (std::size_t i = 0; i < one.parts.parts.size(); ++i) {
+    const PartStress &a = one.parts.parts[i].stress(), &b = ten.parts.parts[i].stress();
+    EXPECT_EQ(one.parts.parts[i].kind(), ten.parts.parts[i].kind());
+    EXPECT_NEAR(b.axial, 10 * a.axial, 1e-6 * b.axial);
+    EXPECT_NEAR(b.dominance, a.dominance, 1e-6 * a.dominance);
+  }
+}
+
+TEST(Verify, ATurnedModelWithATurnedLoadDecidesTheSame) {
+  const PartStress stress = upright().parts.parts[1].stress();
+  VerifyParams params{.triangles = triangles};
+  // x -> y -> z -> x, the turn that load_directions() follows by itself.
+  const Frame turned{.origin = {3, -7, 11}, .x = {0, 1, 0}, .y = {0, 0, 1}, .z = {1, 0, 0}};
+  const CylinderOnBox lying(turned);
+  params.up = {1, 0, 0};
+  const Verification v = verify(lying.proxy, lying.partition, params);
+  ASSERT_EQ(v.parts.parts.size(), 2U);
+  EXPECT_EQ(v.parts.parts[1].kind(), Kind::Column);
+  // The meshes differ, so the means do a little; what runs across is next to nothing and differs more.
+  EXPECT_NEAR(v.parts.parts[1].stress().axial, stress.axial, 0.05 * stress.axial);
+  EXPECT_GT(v.parts.parts[1].stress().dominance, 3);
+}
+
+TEST(Verify, SameBitsOnOneAndTwoThreads) {
+  const CylinderOnBox model;
+  const auto run = [&](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return verify(model.proxy, model.partition, {.triangles = 1000});
+  };
+  const Verification one = run(1), two = run(2);
+  ASSERT_EQ(one.parts.parts.size(), two.parts.parts.size());
+  for (std::size_t i = 0; i < one.parts.parts.size(); ++i) {
+    const Part &a = one.parts.parts[i], &b = two.parts.parts[i];
+    EXPECT_EQ(a.stress().axial, b.stress().axial);
+    EXPECT_EQ(a.stress().von_mises, b.stress().von_mises);
+    EXPECT_EQ(a.reason(), b.reason());
+    EXPECT_EQ(a.bounds_mm().min, b.bounds_mm().min);
+    EXPECT_EQ(a.axis().mean(), b.axis().mean());
+  }
+  EXPECT_EQ(one.residual, two.residual);
+  EXPECT_EQ(one.tets, two.tets);
+}
+
+TEST(Verify, BadNumbersAreRefusedByName) {
+  const CylinderOnBox model;
+  const auto refused = [&](const VerifyParams& params, const char* key) {
+    try {
+      static_cast<void>(verify(model.proxy, model.partition, params));
+      ADD_FAILURE() << key << " was accepted";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), Code::BadRecipe);
+      EXPECT_THAT(error.what(), HasSubstr(key));
+    }
+  };
+  refused({.dominance = 1}, "dominance");
+  refused({.dominance = NAN}, "dominance");
+  refused({.unloaded = 1}, "unloaded");
+  refused({.load_n = 0}, "load_n");
+  refused({.azimuth_deg = INFINITY}, "azimuth_deg");
+  refused({.support_share = 0.5}, "support_share");
+  refused({.up = {0, 0, 0}}, "up");
+  refused({.triangles = 10}, "triangles");
+  refused({.triangles = 1000, .load_box_mm = Box3d{{100, 100, 100}, {110, 110, 110}}}, "load_box_mm");
+}
+
+TEST(Verify, CancelIsHeard) {
+  const CylinderOnBox model;
+  const Context context;
+  context.cancel();
+  try {
+    static_cast<void>(verify(model.proxy, model.partition, {}, {}, context));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), Code::Cancelled);
+  }
+}
+
+TEST(WholeBody, LiesAlongItsLongestAxis) {
+  const Vec3d along = normalized({1, 2, 3});
+  const Proxy proxy = proxy_of(capsule(-30 * along, 30 * along, 6), Box3d{{-30, -35, -40}, {30, 35, 40}}, 1);
+  const Parts parts = whole_body(proxy.surface, Kind::Column);
+  ASSERT_EQ(parts.parts.size(), 1U);
+  const Part& part = parts.parts[0];
+  EXPECT_EQ(part.kind(), Kind::Column);
+  EXPECT_GT(std::abs(dot(part.axis().mean(), along)), 0.9999);
+  EXPECT_NEAR(part.axis().length_mm(), 72, 0.5);
+  EXPECT_LT(norm(part.centroid_mm()), 0.1);
+  const double volume = std::numbers::pi * 36 * (60 + 8);
+  EXPECT_NEAR(part.volume_mm3(), volume, 0.02 * volume);
+  EXPECT_NEAR(part.diameter_mm(), std::sqrt(4 * volume / (std::numbers::pi * 72)), 0.2);
+  EXPECT_LT(part.region()({100, 100, 100}), 0);  // the whole of space
+}
+
+TEST(Load, FallsOnWhatIsSeenFirst) {
+  // A table: the plate hides the floor block from above but for the block's rim.
+  const TetMesh mesh =
+      tetrahedralize(testing::joined(testing::icosphere(10, 3, {0, 0, 30}), testing::icosphere(20, 3, {0, 0, -20})));
+  const Vec3d up{0, 0, 1};
+  const Support support = Support::of(mesh, up, 0.05);
+  EXPECT_NEAR(support.limit_mm, -40 + 0.05 * 80, 0.3);
+  const Footprint footprint = seen_from_above(mesh, up, support, std::nullopt);
+  double above = 0;
+  for (const auto& point : footprint.points) {
+    const Vec3d p = footprint.at(point);
+    EXPECT_GT(p.z, -20.5);  // the lower halves are not seen
+    if (p.z > 10) {
+      ++above;
+    } else {
+      EXPECT_GT(std::hypot(p.x, p.y), 9.7);  // nor is what lies in the small ball's shadow
+    }
+  }
+  EXPECT_NEAR(above / static_cast<double>(footprint.points.size()), 0.25, 0.01);  // by projected area
+
+  const auto shares = nodal_shares(mesh, footprint, 0.1, [](Vec3d) { return true; });
+  const auto small = nodal_shares(mesh, footprint, 0.1, [](Vec3d p) { return p.z > 10; });
+  double sum = 0, small_sum = 0;
+  Vec3d centre{};
+  for (std::size_t node = 0; node < shares.size(); ++node) {
+    sum += shares[node];
+    small_sum += small[node];
+    centre = centre + shares[node] * mesh.nodes[node];
+    if (mesh.nodes[node].z < 10) {
+      EXPECT_EQ(small[node], 0);
+    }
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
+  EXPECT_NEAR(small_sum, above / static_cast<double>(footprint.points.size()), 1e-12);
+  EXPECT_LT(std::hypot(centre.x, centre.y), 0.1);
+}
+
+TEST(Load, DirectionsFollowUpAndAzimuth) {
+  const double s = std::numbers::sqrt2 / 2;
+  const auto near = [](Vec3d a, Vec3d b) { EXPECT_LT(norm(a - b), 1e-12); };
+  near(load_directions({0, 0, 1}, 0)[0], {0, 0, -1});
+  near(load_directions({0, 0, 1}, 0)[1], {-s, 0, -s});
+  near(load_directions({0, 0, 1}, 90)[1], {0, -s, -s});
+  near(load_directions({1, 0, 0}, 0)[1], {-s, -s, 0});
+  near(load_directions({0, 1, 0}, 0)[1], {0, -s, -s});
+  near(load_directions({0, 0, -1}, 90)[1], {0, s, s});
+}
+
+TEST(Locator, GivesQuadraticFieldsBackExactly) {
+  const TetMesh mesh = tetrahedralize(testing::icosphere(10, 3));
+  const auto field = [](Vec3d p) {
+    return Vec3d{p.x * p.x - p.y * p.z, 3 + p.y - p.x * p.z, p.z * p.z + 2 * p.x * p.y};
+  };
+  std::vector<Vec3d> nodal;
+  for (const Vec3d& p : mesh.nodes) nodal.push_back(field(p));
+  const fem::Locator locator(mesh);
+  Random random(1, "locator");
+  const auto at = [&] { return 18 * random.uniform() - 9; };
+  int inside = 0;
+  while (inside < 500) {
+    const Vec3d p{at(), at(), at()};
+    if (norm(p) > 9) continue;
+    ++inside;
+    EXPECT_LT(norm(locator.interpolate(nodal, p) - field(p)), 1e-9);
+  }
+  // Outside, the nearest of the surface answers.
+  const Vec3d out = normalized({1, -2, 0.5});
+  EXPECT_LT(norm(locator.interpolate(nodal, 10.2 * out) - field(9.95 * out)), 4);
+}
+
+TEST(MeanStress, OfAUniformStateIsThatState) {
+  const TetMesh mesh = tetrahedralize(testing::icosphere(10, 2));
+  std::vector<std::uint32_t> all(mesh.tets.size());
+  for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = t;
+  // Along z: 10; across: principal -3 and 1, at 30 degrees from x.
+  const double c = std::cos(std::numbers::pi / 6), s = std::sin(std::numbers::pi / 6);
+  const fem::Stress state{-3 * c * c + s * s, -3 * s * s + c * c, 10, -4 * c * s, 0, 0};
+  const MeanStress mean =
+      mean_in_axis(mesh, std::vector(mesh.tets.size(), state), all, Axis::straight({0, 0, 0}, {0, 0, 1}));
+  EXPECT_NEAR(mean.axial, 10, 1e-12);
+  EXPECT_NEAR(mean.transverse[0], 3, 0.05);  // directions are 11 degrees apart
+  EXPECT_NEAR(mean.transverse[1], 1, 0.05);
+  EXPECT_NEAR(mean.von_mises, std::sqrt(0.5 * (13 * 13 + 4 * 4 + 9 * 9)), 1e-9);
+  EXPECT_NEAR(mean.volume_mm3, volume_mm3(mesh), 1e-9);
+  const MeanStress world = mean_in_world(mesh, std::vector(mesh.tets.size(), state), all);
+  EXPECT_NEAR(world.axial, 10, 1e-12);
+  EXPECT_NEAR(world.transverse[0], 2, 1e-12);
+  EXPECT_NEAR(world.transverse[1], 0, 1e-12);
+}
+
+TEST(MeanStress, DirectionsAcrossTurnWithABentAxis) {
+  // A ring under pure hoop stress: all of it is along the circular axis, nothing across.
+  const TetMesh mesh = tetrahedralize(testing::torus_mesh(20, 4, 48, 16));
+  std::vector<Vec3d> circle;
+  for (int k = 0; k < 120; ++k) circle.push_back(20 * Vec3d{std::cos(k * 0.05), std::sin(k * 0.05), 0});
+  std::vector<fem::Stress> stress;
+  std::vector<std::uint32_t> half;
+  for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
+    Vec3d p{};
+    for (std::size_t k = 0; k < 4; ++k) p = p + 0.25 * mesh.nodes[mesh.tets[t][k]];
+    const Vec3d h = normalized({-p.y, p.x, 0});
+    stress.push_back({5 * h.x * h.x, 5 * h.y * h.y, 0, 5 * h.x * h.y, 0, 0});
+    if (p.y > 0) half.push_back(t);
+  }
+  const MeanStress mean = mean_in_axis(mesh, stress, half, Axis::along(circle));
+  EXPECT_NEAR(mean.axial, 5, 0.05);
+  EXPECT_LT(mean.transverse[0], 0.05);
+  EXPECT_GT(mean.dominance(), 100);
+}
+
+}  // namespace
+}  // namespace fibrolite

@@ -13,7 +13,7 @@
 namespace fibrolite {
 
 struct TetrahedralizeParams {
-  double max_volume_mm3 = 0;   ///< Largest tetrahedron; 0: no limit.
+  double max_volume_mm3 = 0;   ///< Largest tetrahedron, as far as the triangles of the surface allow; 0: no limit.
   double radius_edge = 1.6;    ///< TetGen's quality bound; above 1.2.
   int cpu_limit_s = 60;        ///< The child is ended after this.
   int memory_limit_mb = 4096;  ///< The child gets no more than this.
@@ -32,8 +32,10 @@ struct ExtractParams {
   int max_surface_triangles = 6000;  ///< Aim of the simplification.
   double max_distance_vox = 0.5;     ///< Bound of the simplification, voxels.
 };
-/// One component as tetrahedra: realize max(body, region), surface, simplify within a bound, check, tetrahedralize; one
-/// retry with a coarser surface. Loose islands without the largest piece are dropped. @throws Error SolverFailed.
+/// One component as tetrahedra: realize max(body, region), surface, simplify within a bound, check, tetrahedralize;
+/// when that fails, again with a coarser surface, and once more with one that is not simplified. The shell that
+/// encloses most is kept, with its cavities of 27 voxels or more; loose islands are dropped. @throws Error
+/// SolverFailed, BadRecipe, Cancelled.
 [[nodiscard]] TetMesh extract(const Proxy& proxy, const Shape& region, const ExtractParams& params = {},
                               const Context& context = {});
 
