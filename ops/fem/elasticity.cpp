@@ -17,6 +17,10 @@
 #include "fibrolite/box.h"
 #include "fibrolite/error.h"
 
+// Of libgomp, which CHOLMOD brings; its header belongs to the compiler and is not everywhere.
+extern "C" void omp_set_max_active_levels(int levels);
+extern "C" int omp_get_max_active_levels();
+
 namespace fibrolite::fem {
 namespace {
 
@@ -297,7 +301,22 @@ Sparse assemble(const TetMesh& mesh, const Incidence& incidence, const Lame& lam
   return matrix;
 }
 
+/// While it lives, OpenMP regions of this thread run on this thread alone. Debian's CHOLMOD asks for four threads in
+/// each of its many small regions; beside TBB's own they wait for each other far longer than they work (27 s for 6 s of
+/// work, measured).
+class SerialOpenMp {
+ public:
+  SerialOpenMp() : before_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~SerialOpenMp() { omp_set_max_active_levels(before_); }
+  SerialOpenMp(const SerialOpenMp&) = delete;
+  SerialOpenMp& operator=(const SerialOpenMp&) = delete;
+
+ private:
+  int before_;
+};
+
 Eigen::MatrixXd cholesky_solve(const Sparse& matrix, const Eigen::MatrixXd& loads) {
+  const SerialOpenMp serial;
   openblas_set_num_threads(1);
   Eigen::CholmodSupernodalLLT<Sparse, Eigen::Lower> solver;
   solver.cholmod().print = 0;  // it would write its complaints to stdout
