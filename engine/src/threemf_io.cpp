@@ -235,8 +235,8 @@ struct Palette {
 
 MeshFile read_3mf(const Source& source, const Context& context) { return ThreeMfReader(source, context).read(); }
 
-// Why not lib3mf's writer: it prints six digits behind the point, whatever the size of the number (1e-7 becomes 0), puts
-// random UUIDs into the file, and holds a second copy of the mesh.
+// Why not lib3mf's writer: it prints six digits behind the point, whatever the size of the number (1e-7 becomes 0),
+// puts random UUIDs into the file, and holds a second copy of the mesh.
 void write_3mf(OutputFile& file, const Mesh& mesh, const Context& context) {
   if (mesh.vertices.size() > 0x7fffffffu)
     throw Error(Code::TooLarge, "a 3MF mesh has at most 2,147,483,647 vertices", "", "write .stl or .ply");

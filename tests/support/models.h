@@ -10,13 +10,13 @@
 
 namespace fibrolite::testing {
 
-Mesh cube(double side_mm, Vec3d min_corner = {});       ///< 12 triangles, outward.
+Mesh cube(double side_mm, Vec3d min_corner = {});  ///< 12 triangles, outward.
 Mesh icosphere(double radius_mm, int subdivisions, Vec3d center = {});
 Mesh tube(double radius_mm, double length_mm, int sides, Vec3d base = {});  ///< Closed cylinder along z.
 Mesh torus_mesh(double ring_mm, double tube_mm, int ring_sides, int tube_sides);
-Mesh flipped(Mesh mesh);                                 ///< Inside out.
+Mesh flipped(Mesh mesh);  ///< Inside out.
 Mesh moved(Mesh mesh, Vec3d by);
-Mesh turned(Mesh mesh, int axis, int quarter_turns);     ///< By 90 degrees about x, y or z.
+Mesh turned(Mesh mesh, int axis, int quarter_turns);  ///< By 90 degrees about x, y or z.
 Mesh joined(const Mesh& a, const Mesh& b);
 Mesh without_triangle(Mesh mesh, std::size_t index);
 

@@ -30,11 +30,12 @@ struct Mesh {
 /// Surface area, mm2.
 [[nodiscard]] double area(const Mesh& mesh);
 
-/// The same triangles in the same order on one vertex per place: equal coordinates (-0 equals 0) become one, unused ones go.
-/// Cost: O(n), parallel.
+/// The same triangles in the same order on one vertex per place: equal coordinates (-0 equals 0) become one, unused
+/// ones go. Cost: O(n), parallel.
 [[nodiscard]] Mesh welded(const Mesh& mesh);
-/// Is the area exactly zero? The differences of float coordinates are exact in double (unless coordinates of one axis differ by
-/// more than 2^29 in magnitude), and their products are compared together with their rounding errors: nothing is rounded.
+/// Is the area exactly zero? The differences of float coordinates are exact in double (unless coordinates of one axis
+/// differ by more than 2^29 in magnitude), and their products are compared together with their rounding errors: nothing
+/// is rounded.
 [[nodiscard]] bool zero_area(Vec3f a, Vec3f b, Vec3f c);
 
 /// The topology of a triangle mesh as a printer sees it: vertices with equal coordinates are one vertex.

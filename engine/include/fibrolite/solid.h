@@ -23,8 +23,8 @@ class Solid {
   [[nodiscard]] Box3d bounds_mm() const;
   [[nodiscard]] std::int64_t active_voxels() const;
   [[nodiscard]] std::int64_t memory_bytes() const;
-  /// Volume of { distance < 0 }, mm3. Each sample counts with the share of its voxel below zero, from the distance and its
-  /// Laplacian there. Error about 1 % for sticks three voxels thick, falling with the square of the thickness.
+  /// Volume of { distance < 0 }, mm3. Each sample counts with the share of its voxel below zero, from the distance and
+  /// its Laplacian there. Error about 1 % for sticks three voxels thick, falling with the square of the thickness.
   /// Cost: O(active voxels), parallel; the same bits on any number of threads.
   [[nodiscard]] double volume_mm3() const;
   /// Trilinear distance at a world point, mm; +-(band) outside the band. Cost: O(1).
