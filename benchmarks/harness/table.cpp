@@ -50,8 +50,9 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
 }
 
 void print_head() {
-  std::printf("%-14s %-18s %6s %6s | %7s %7s %7s %7s | %7s %8s %8s | %8s %7s %7s\n", "case", "model", "size", "voxel",
-              "wall s", "CPU s", "compute", "files", "peak MB", "M voxels", "M tris", "floor s", "x floor", "process");
+  std::printf("%-14s %-18s %6s %6s | %7s %7s %7s %7s | %7s %8s %8s | %8s %7s %7s %7s\n", "case", "model", "size",
+              "voxel", "wall s", "CPU s", "compute", "files", "peak MB", "M voxels", "M tris", "floor s", "x floor",
+              "x CPU", "process");
 }
 
 void print_row(const Case& c, const Run& run) {
@@ -61,10 +62,10 @@ void print_row(const Case& c, const Run& run) {
                 run.failure.c_str());
     return;
   }
-  std::printf("%-14s %-18s %6g %6g | %7.2f %7.2f %7.2f %7.2f | %7.0f %8.2f %8.2f | %8.2f %7.2f %7.2f\n", c.name.c_str(),
-              model.c_str(), c.size_mm, c.voxel_mm, run.program.wall_s, run.program.cpu_s, run.compute_s, run.files_s,
-              run.program.peak_rss_mb, run.active_voxels / 1e6, run.triangles / 1e6, run.floor_compute_s,
-              run.compute_ratio(), run.process_ratio());
+  std::printf("%-14s %-18s %6g %6g | %7.2f %7.2f %7.2f %7.2f | %7.0f %8.2f %8.2f | %8.2f %7.2f %7.2f %7.2f\n",
+              c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.program.wall_s, run.program.cpu_s,
+              run.compute_s, run.files_s, run.program.peak_rss_mb, run.active_voxels / 1e6, run.triangles / 1e6,
+              run.floor_compute_s, run.compute_ratio(), run.cpu_ratio(), run.process_ratio());
   std::string line = "    wall/CPU s:";
   for (const Stage& stage : run.stages)
     line += "  " + stage.name + " " + number(stage.wall_s, 2) + "/" + number(stage.cpu_s, 2);
@@ -119,6 +120,7 @@ nlohmann::json to_json(const Case& c, const Run& run) {
                    {"compute_s", run.floor_compute_s},
                    {"compute_cpu_s", run.floor_compute_cpu_s}};
   json["compute_ratio"] = run.compute_ratio();
+  json["cpu_ratio"] = run.cpu_ratio();
   json["process_ratio"] = run.process_ratio();
   bool met = true;
   json["goals"] = judge(c, run, met);

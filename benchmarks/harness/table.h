@@ -27,6 +27,7 @@ struct Run {
   std::string failure;  ///< Empty if both ended well.
 
   [[nodiscard]] double compute_ratio() const { return compute_s / floor_compute_s; }
+  [[nodiscard]] double cpu_ratio() const { return compute_cpu_s / floor_compute_cpu_s; }
   [[nodiscard]] double process_ratio() const { return program.wall_s / floor.wall_s; }
 };
 /// Fill in what the program's report and the floor's answer say.
