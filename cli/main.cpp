@@ -92,4 +92,7 @@ int run_and_report(int argc, char** argv) {
 }  // namespace
 }  // namespace fibrolite::cli
 
-int main(int argc, char** argv) { return fibrolite::cli::run_and_report(argc, argv); }
+int main(int argc, char** argv) {
+  fibrolite::cli::handle_signals();
+  return fibrolite::cli::run_and_report(argc, argv);
+}

@@ -58,11 +58,7 @@ InterfaceReport interface_report(const Cut& cut) {
 }
 
 void fill_report(Report& report, const Model& model, const Partition& parts) {
-  report.model.triangles = static_cast<std::int64_t>(model.mesh.triangles.size());
-  report.model.size_mm = bounds(model.mesh).size();
   report.model.volume_mm3 = signed_volume(model.mesh);
-  report.model.repairs = model.repairs;
-  report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
   report.warnings.insert(report.warnings.end(), parts.notes.begin(), parts.notes.end());
   report.threshold = parts.threshold;
   report.stable_from = parts.stable_from;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 #include "fibrolite/error.h"
 #include "fibrolite/file.h"
@@ -37,7 +39,11 @@ Model load_model(const ModelOptions& options, Report& report, const Context& con
   const MeshFile file = stage("read", [&] { return read_model(options.path, context.part(0, 0.5, "read")); });
   Model model = stage("prepare", [&] { return prepare(file, options.prepare, context.part(0.5, 1, "prepare")); });
   report.model.path = options.path.string();
-  report.warnings.insert(report.warnings.end(), file.notes.begin(), file.notes.end());
+  report.model.triangles = static_cast<std::int64_t>(model.mesh.triangles.size());
+  report.model.size_mm = bounds(model.mesh).size();
+  report.model.repairs = model.repairs;
+  for (const std::vector<std::string>& list : {std::cref(file.notes), std::cref(std::as_const(model.warnings))})
+    report.warnings.insert(report.warnings.end(), list.begin(), list.end());
   return model;
 }
 

@@ -32,6 +32,10 @@ std::string share(double part, double whole) {
   return whole > 0 && std::isfinite(part) ? number_text(100 * part / whole, 3) + " %" : "-";
 }
 
+std::string counted(std::int64_t number, const std::string& thing) {
+  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
+}
+
 std::string joints_line(const std::vector<InterfaceReport>& interfaces) {
   if (interfaces.empty()) return {};
   int columns = 0, dropped = 0;
@@ -39,7 +43,7 @@ std::string joints_line(const std::vector<InterfaceReport>& interfaces) {
     columns += interface.columns;
     dropped += interface.columns_dropped;
   }
-  return "joints    " + std::to_string(interfaces.size()) + ", with " + std::to_string(columns) + " support columns (" +
+  return "joints    " + std::to_string(interfaces.size()) + ", with " + counted(columns, "support column") + " (" +
          std::to_string(dropped) + " found no crystal)\n";
 }
 
@@ -75,8 +79,8 @@ void print_summary(const Report& report, const std::vector<std::filesystem::path
   std::string text = parts_table(report.parts) + joints_line(report.interfaces);
   const SolidReport& solid = report.solid;
   text += "solid     " + measured(solid.mass_g) + " g, " + measured(solid.volume_mm3, 6) + " mm3, " +
-          measured(100 * solid.fill_ratio, 3) + " % of the full model, " + std::to_string(solid.pieces) +
-          (solid.pieces == 1 ? " piece, " : " pieces, ") + std::to_string(solid.cavities) + " closed cavities\n";
+          measured(100 * solid.fill_ratio, 3) + " % of the full model, " + counted(solid.pieces, "piece") + ", " +
+          counted(solid.cavities, "closed void") + "\n";
   text += "mesh      " + std::to_string(report.mesh.triangles) + " triangles, " +
           (report.mesh.closed() ? "closed" : std::to_string(report.mesh.boundary_edges) + " open edges") + "; voxel " +
           measured(solid.voxel_mm) + " mm\n";

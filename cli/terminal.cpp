@@ -32,19 +32,9 @@ extern "C" void on_signal(int) {
   if (Outputs::committing()) return;  // all outputs are in place in a moment
   discard_uncommitted_files();
   Outputs::discard();
+  constexpr std::string_view line = "fibrolite: error: cancelled (by a signal); nothing was written\n";
+  static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));
   _exit(Interrupted);
-}
-
-void handle_signals(void (*handler)(int)) {
-  struct sigaction action {};
-  action.sa_handler = handler;
-  action.sa_flags = SA_RESTART;
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    // A program started with nohup, or in the background of a script, keeps ignoring what it was told to ignore.
-    struct sigaction before {};
-    sigaction(signal, nullptr, &before);
-    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
-  }
 }
 
 std::string one_line(std::string text) {
@@ -126,19 +116,28 @@ Terminal::Terminal(const RunOptions& options) : state_(std::make_unique<State>()
   }
   state->context = Context(progress, log);
   running = &state->context;
-  handle_signals(on_signal);
-  // A child that crashed, a closed stdout and a file-size limit are errors to report, not ends.
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 Terminal::~Terminal() {
   state_->erase_bar();
-  handle_signals(SIG_DFL);
   running = nullptr;
 }
 
 const Context& Terminal::context() const { return state_->context; }
+
+void handle_signals() {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  action.sa_flags = SA_RESTART;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    // A program started with nohup, or in the background of a script, keeps ignoring what it was told to ignore.
+    struct sigaction before {};
+    sigaction(signal, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
+  }
+  // A child that crashed, a closed stdout and a file-size limit are errors to report, not ends.
+  for (const int signal : {SIGPIPE, SIGXFSZ}) std::signal(signal, SIG_IGN);
+}
 
 bool interrupted() { return asked_to_stop; }
 

@@ -25,6 +25,9 @@ class Terminal {
   std::unique_ptr<State> state_;
 };
 
+/// SIGINT, SIGTERM and SIGHUP cancel the running command; a second one, or one where no command runs, removes
+/// unfinished outputs and ends the program at once.
+void handle_signals();
 /// Whether a signal asked to stop.
 [[nodiscard]] bool interrupted();
 /// Results: to standard output. @throws Error Io if it cannot be written.
