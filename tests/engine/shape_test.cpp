@@ -42,7 +42,9 @@ TEST(Primitives, a_round_cone_is_the_union_of_the_spheres_between_its_ends) {
       const double t = k / 4000.0;
       best = std::min(best, norm(p - a - t * (b - a)) - (2.5 + t * (0.7 - 2.5)));
     }
-    if (best > 0) ASSERT_NEAR(cone(p), best, 1e-3);
+    if (best > 0) {
+      ASSERT_NEAR(cone(p), best, 1e-3);
+    }
   }
 }
 
@@ -109,7 +111,9 @@ TEST(Capsules, near_ones_are_exact_and_far_ones_never_too_far) {
   for (int i = 0; i < 3000; ++i) {
     const Vec3d p = point(random, 60);
     const float truth = slow(p), value = fast(p);
-    if (truth < 2) ASSERT_NEAR(value, truth, 1e-5);
+    if (truth < 2) {
+      ASSERT_NEAR(value, truth, 1e-5);
+    }
     ASSERT_LE(value, truth + 1e-5F);
     ASSERT_EQ(value < 0, truth < 0);
   }

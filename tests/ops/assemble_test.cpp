@@ -40,7 +40,9 @@ TEST(Assemble, has_the_sign_of_the_formula_everywhere) {
       const Vec3d p = points[i];
       const double fill = std::min(std::max<double>(a(p), low(p) - overlap), std::max<double>(b(p), high(p) - overlap));
       const double truth = std::max<double>(body(p), std::min({-(body(p) + t), fill, static_cast<double>(joint(p))}));
-      if (std::abs(truth) > 1e-4) ASSERT_EQ(values[i] < 0, truth < 0) << p.x << ' ' << p.y << ' ' << p.z;
+      if (std::abs(truth) > 1e-4) {
+        ASSERT_EQ(values[i] < 0, truth < 0) << p.x << " " << p.y << " " << p.z;
+      }
     }
   }
 }
