@@ -2,7 +2,6 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Surface_mesh.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_distance_placement.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_cost.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
@@ -119,16 +118,35 @@ Mesh from_cgal(CgalMesh& mesh) {
   return result;
 }
 
-/// Edge collapse that keeps the volume (Lindstrom and Turk 1998), never farther than `bound_mm` from the given surface.
-Mesh simplified(const Mesh& mesh, int triangles, double bound_mm, const Context& context) {
+/// Places that a vertex may not go to are refused by asking the grid the surface came from: a tree over its triangles,
+/// as CGAL offers it, costs most of the simplification.
+class BoundedPlacement {
+ public:
+  BoundedPlacement(const Solid& solid, double bound_mm) : solid_(&solid), bound_mm_(bound_mm) {}
+  template <class Profile>
+  auto operator()(const Profile& profile) const -> boost::optional<typename Profile::Point> {
+    const auto place = free_(profile);
+    if (!place) return place;
+    const float off = solid_->distance({place->x(), place->y(), place->z()});
+    return std::abs(static_cast<double>(off)) <= bound_mm_ ? place : boost::none;
+  }
+
+ private:
+  const Solid* solid_;
+  double bound_mm_;
+  sms::LindstromTurk_placement<CgalMesh> free_;
+};
+
+/// Edge collapse that keeps the volume (Lindstrom and Turk 1998); no vertex goes farther than `bound_mm` from the
+/// surface.
+Mesh simplified(const Mesh& mesh, const Solid& solid, int triangles, double bound_mm, const Context& context) {
   CgalMesh fine = to_cgal(mesh);
   context.check();
   const auto edges = static_cast<std::size_t>(triangles) * 3 / 2;
   if (fine.number_of_edges() > edges) {
-    using Placement = sms::Bounded_distance_placement<sms::LindstromTurk_placement<CgalMesh>, Kernel>;
     sms::edge_collapse(fine, sms::Count_stop_predicate<CgalMesh>(edges),
                        CGAL::parameters::get_cost(sms::LindstromTurk_cost<CgalMesh>())
-                           .get_placement(Placement(bound_mm, sms::LindstromTurk_placement<CgalMesh>())));
+                           .get_placement(BoundedPlacement(solid, bound_mm)));
   }
   context.check();
   // Judged at the floats that go on, not at the doubles they came from.
@@ -161,8 +179,8 @@ TetMesh extract(const Proxy& proxy, const Shape& region, const ExtractParams& pa
     Mesh piece = main_piece(surface(solid, {}, context.part(0.2, 0.3, "extract")), 27 * voxel * voxel * voxel);
     try {
       if (attempt.distance > 0) {
-        piece = simplified(piece, params.max_surface_triangles, attempt.distance * params.max_distance_vox * voxel,
-                           context);
+        piece = simplified(piece, solid, params.max_surface_triangles,
+                           attempt.distance * params.max_distance_vox * voxel, context);
       }
       context.progress(0.6);
       return tetrahedralize(piece, {}, context.part(0.6, 1, "extract"));

@@ -26,8 +26,8 @@ struct VerifyParams {
   bool world_axes = false;  ///< The paper's x, y, z instead of the part's own axis field.
   Vec3d up{0, 0, 1};        ///< Any length above zero.
   /// Surface triangles of the whole body's mesh at most; a component gets its share by area, a quarter to two thirds of
-  /// it. Means change by a few per cent from 2000 to 6000. 500 to 50000.
-  int triangles = 6000;
+  /// it. Means change by a few per cent from 3000 to 6000. 500 to 50000.
+  int triangles = 4000;
   /// The load acts on the surface in here alone; default: on all that is seen from above.
   std::optional<Box3d> load_box_mm{};
 };
