@@ -26,26 +26,37 @@ struct Sums {
   }
 };
 
-/// Which region owns each point of a block: the one with the least value. One region with the least bound owns all.
-void owners(const std::vector<Shape>& regions, const PointBlock& block, const Box3d& box, std::vector<int>& out) {
-  out.assign(static_cast<std::size_t>(block.count), 0);
-  if (regions.size() < 2) return;
-  std::vector<Interval> bounds;
-  float least_hi = far_mm;
-  for (const Shape& r : regions) {
-    bounds.push_back(r.bound(box));
-    least_hi = std::min(least_hi, bounds.back().hi);
+/// The share of each region in each sample's voxel: shares[region][sample], 1 in all. Near a border a voxel is split as
+/// the border runs through it, so that volumes do not jump when a border passes a sample.
+void split(const std::vector<Shape>& regions, const PointBlock& block, const Box3d& box, float inverse_voxel,
+           std::vector<Values>& shares) {
+  shares.resize(regions.size());
+  if (regions.size() == 1) {
+    shares[0].fill(1);
+    return;
   }
-  Values best, value;
-  best.fill(far_mm);
+  Values sum{}, least;
+  least.fill(far_mm);
+  std::array<std::size_t, PointBlock::capacity> owner{};
   for (std::size_t i = 0; i < regions.size(); ++i) {
-    if (bounds[i].lo > least_hi) continue;
+    if (regions[i].bound(box).lo * inverse_voxel >= 0.5F) {
+      shares[i].fill(0);
+      continue;
+    }
+    Values value;
     regions[i].evaluate(block, value.data());
-    for (std::size_t k = 0; k < out.size(); ++k) {
-      if (value[k] < best[k]) {
-        best[k] = value[k];
-        out[k] = static_cast<int>(i);
+    for (std::size_t k = 0; k < value.size(); ++k) {
+      shares[i][k] = below(value[k], inverse_voxel);
+      sum[k] += shares[i][k];
+      if (value[k] < least[k]) {
+        least[k] = value[k];
+        owner[k] = i;
       }
+    }
+  }
+  for (std::size_t k = 0; k < sum.size(); ++k) {
+    for (std::size_t i = 0; i < regions.size(); ++i) {
+      shares[i][k] = sum[k] > 0 ? shares[i][k] / sum[k] : (i == owner[k] ? 1.0F : 0.0F);
     }
   }
 }
@@ -58,7 +69,7 @@ std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const st
   const auto inverse = static_cast<float>(1 / h), shell = static_cast<float>(shell_mm);
   const auto origins = blocks(body);
   const Shape body_shape = distance_to(body), solid_shape = distance_to(solid);
-  const std::size_t n = std::max<std::size_t>(regions.size(), 1);
+  const std::size_t n = regions.size();
 
   // Chunks of blocks are summed on their own and added in order: the same bits on any number of threads.
   constexpr std::size_t chunk = 256;
@@ -75,17 +86,21 @@ std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const st
       body_shape.evaluate(block, b.data());
       solid_shape.evaluate(block, s.data());
       const Vec3d low = h * Vec3d{1.0 * block.leaf->x, 1.0 * block.leaf->y, 1.0 * block.leaf->z};
-      thread_local std::vector<int> owner;
-      owners(regions, block, {low, low + Vec3d{7 * h, 7 * h, 7 * h}}, owner);
+      thread_local std::vector<Values> shares;
+      split(regions, block, {low, low + Vec3d{7 * h, 7 * h, 7 * h}}, inverse, shares);
       for (std::size_t k = 0; k < PointBlock::capacity; ++k) {
         const float part = below(b[k], inverse);
         if (part <= 0) continue;
-        Sums& into = sums[number * n + static_cast<std::size_t>(owner[k])];
-        const float lumen = below(b[k] + shell, inverse);
-        into.part += part;
-        into.lumen += lumen;
-        into.infill += std::min(lumen, below(s[k], inverse));
-        into.moment = into.moment + static_cast<double>(part) * Vec3d{block.x[k], block.y[k], block.z[k]};
+        const float lumen = below(b[k] + shell, inverse), infill = std::min(lumen, below(s[k], inverse));
+        for (std::size_t r = 0; r < n; ++r) {
+          const float share = shares[r][k];
+          if (share <= 0) continue;
+          Sums& into = sums[number * n + r];
+          into.part += share * part;
+          into.lumen += share * lumen;
+          into.infill += share * infill;
+          into.moment = into.moment + static_cast<double>(share * part) * Vec3d{block.x[k], block.y[k], block.z[k]};
+        }
       }
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {

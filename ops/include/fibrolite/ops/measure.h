@@ -16,9 +16,9 @@ struct PartVolumes {
   double infill_mm3 = 0;  ///< Material in the lumen (fills, joints and ties).
   Vec3d centroid_mm{};    ///< Of part_mm3.
 };
-/// One entry per region; a point belongs to the region with the least value. `body` and `solid` share one lattice.
-/// Samples near a surface count in part. Cost: O(samples inside the body), parallel; the same bits on any number of
-/// threads.
+/// One entry per region, at least one; a voxel on a border counts for both in part. `body` and `solid` share one
+/// lattice. Samples near a surface count in part. Cost: O(samples inside the body), parallel; the same bits on any
+/// number of threads.
 [[nodiscard]] std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
                                                double shell_mm, const Context& context = {});
 
