@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
+#include <mutex>
 #include <numeric>
 #include <string>
 
@@ -323,7 +323,14 @@ Eigen::MatrixXd cholesky_solve(const Sparse& matrix, const Eigen::MatrixXd& load
   solver.cholmod().nmethods =
       1;  // nested dissection wins on volume meshes: trying others first costs a third of the time
   solver.cholmod().method[0].ordering = CHOLMOD_METIS;
-  solver.compute(matrix);
+  {
+    // METIS draws its random numbers from one state of the whole process: two orderings at once would spoil each
+    // other's bits.
+    static std::mutex one_ordering_at_a_time;
+    const std::lock_guard lock(one_ordering_at_a_time);
+    solver.analyzePattern(matrix);
+  }
+  if (solver.info() == Eigen::Success) solver.factorize(matrix);
   if (solver.info() != Eigen::Success) {
     throw Error(Code::SolverFailed, "the stiffness matrix is singular or does not fit the memory", "elasticity",
                 "look for parts that hang by a point or an edge");

@@ -200,29 +200,6 @@ std::vector<std::size_t> merge_bulk(const Partition& partition, const std::vecto
   return group;
 }
 
-/// The stress of several candidates as one part, weighted by volume.
-PartStress mean_of(const std::vector<std::size_t>& members, const std::vector<Verdict>& verdicts,
-                   const Partition& partition) {
-  PartStress mean;
-  double volume = 0;
-  mean.dominance = std::numeric_limits<double>::infinity();
-  for (const std::size_t i : members) {
-    const double v = partition.candidates[i].volume_mm3;
-    const PartStress& s = verdicts[i].stress;
-    volume += v;
-    mean.axial += v * s.axial;
-    for (int k = 0; k < 2; ++k) mean.transverse[k] += v * s.transverse[k];
-    mean.von_mises += v * s.von_mises;
-    mean.dominance = std::min(mean.dominance, s.dominance);
-  }
-  if (volume > 0) {
-    mean.axial /= volume;
-    for (double& t : mean.transverse) t /= volume;
-    mean.von_mises /= volume;
-  }
-  return mean;
-}
-
 void make_parts(Verification& result, const Proxy& proxy, const Partition& partition,
                 const std::vector<Verdict>& verdicts) {
   const std::vector<std::size_t> group = merge_bulk(partition, verdicts);
@@ -279,7 +256,7 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
                                                   .diameter_mm = candidate.diameter_mm,
                                                   .volume_mm3 = draft.volume_mm3,
                                                   .centroid_mm = draft.centroid_mm,
-                                                  .stress = mean_of(draft.members, verdicts, partition),
+                                                  .stress = verdicts[main].stress,
                                                   .reason = std::move(reason)}));
   }
 }

@@ -13,12 +13,13 @@ namespace fibrolite {
 enum class Kind { Column, Bulk };
 [[nodiscard]] constexpr const char* name(Kind kind) { return kind == Kind::Column ? "column" : "bulk"; }
 
-/// Mean stress of a part in its own axis field, of the load case that decided, MPa.
+/// Mean stress of a part in its own axis field, of the load case that decided (the one with the smallest dominance),
+/// MPa. Of merged pieces: of the largest.
 struct PartStress {
   double axial = 0;
   double transverse[2] = {0, 0};
   double von_mises = 0;
-  double dominance = 0;  ///< |axial| / max |transverse|, the smallest over all load cases; 0 if unloaded.
+  double dominance = 0;  ///< axial / transverse[0], the smallest over the load cases that load it; 0 if unloaded.
 };
 
 class Part {
@@ -35,7 +36,7 @@ class Part {
   [[nodiscard]] const std::string& reason() const { return reason_; }
 
  private:
-  friend class PartMaker;  // ops/src/verify.cpp alone defines it
+  friend class PartMaker;  // ops/src/part_maker.h, for this library alone
   Part() = default;
   int id_ = 0;
   Kind kind_ = Kind::Bulk;
