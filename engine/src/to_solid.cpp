@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fibrolite/to_solid.h"
 
-#include <openvdb/tools/VolumeToMesh.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "fibrolite/error.h"
 #include "fibrolite/winding.h"
+#include "sharpen.h"
 #include "surface_topology.h"
 #include "triangle_band.h"
 #include "vdb_access.h"
@@ -38,26 +37,6 @@ void validate(const Mesh& mesh, const ToSolidParams& params) {
   if (farthest / voxel > 1e9) {
     throw Error(Code::TooLarge, "more than 2^31 voxels along an axis", {}, "use a larger --voxel");
   }
-}
-
-/// Zero level of a band as a mesh, outward.
-Mesh zero_level(const openvdb::FloatTree::Ptr& tree, double voxel_mm) {
-  auto grid = openvdb::FloatGrid::create(tree);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel_mm));
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  std::vector<openvdb::Vec3s> points;
-  std::vector<openvdb::Vec3I> triangles;
-  std::vector<openvdb::Vec4I> quads;
-  openvdb::tools::volumeToMesh(*grid, points, triangles, quads, 0.0, 0.0);
-  Mesh mesh;
-  mesh.vertices.reserve(points.size());
-  for (const auto& p : points) mesh.vertices.push_back({p.x(), p.y(), p.z()});
-  mesh.triangles.reserve(2 * quads.size());
-  for (const auto& q : quads) {
-    mesh.triangles.push_back({q[0], q[2], q[1]});
-    mesh.triangles.push_back({q[0], q[3], q[2]});
-  }
-  return mesh;
 }
 
 Mesh turned_inside_out(Mesh mesh) {
@@ -115,18 +94,17 @@ class Conversion {
     BandParams params = band_;
     params.inside_vox = params.outside_vox = 2;
     params.by_winding = true;
-    Band band = triangle_band(mesh, topology, WindingTree(mesh), params, context_.part(0, 0.4, ""));
+    const WindingTree winding(mesh);
+    Band band = triangle_band(mesh, topology, winding, params, context_.part(0, 0.4, ""));
     if (!has_inside(*band.tree)) no_volume();
-    if (band.sides_by_winding > band.sides_by_mesh) {
-      throw Error(Code::BadInput,
-                  "the mesh is an open sheet: more than half of the surface around its inside is missing", {},
+    if (2 * band.doubtful_samples > band.inside_samples) {
+      throw Error(Code::BadInput, "the mesh is an open sheet, not the surface of a body", {},
                   "close it, or give the sheet a thickness");
     }
-    const Mesh surface = zero_level(band.tree, params.voxel_mm);
+    const Mesh surface = sharp_zero_level(band.tree, params.voxel_mm, mesh, winding, context_);
     band.tree.reset();
-    context_.check();
-    const SurfaceTopology clean = surface_topology(surface);
-    return triangle_band(surface, clean, WindingTree(surface), band_, context_.part(0.5, 1, "")).tree;
+    return triangle_band(surface, surface_topology(surface), WindingTree(surface), band_, context_.part(0.5, 1, ""))
+        .tree;
   }
 
   [[noreturn]] static void no_volume() {

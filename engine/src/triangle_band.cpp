@@ -51,7 +51,7 @@ struct Tile {
 struct Cell {
   std::vector<std::unique_ptr<Leaf>> leaves;
   std::vector<Tile> inner;
-  std::int64_t sides_by_mesh = 0, sides_by_winding = 0;
+  std::int64_t inside_samples = 0, doubtful_samples = 0;
   bool overlap = false;  ///< A winding number that is neither 0 nor 1 in a place thicker than a voxel.
 };
 
@@ -161,8 +161,8 @@ class Builder {
           }
         }
       }
-      band_.sides_by_mesh += cell.sides_by_mesh;
-      band_.sides_by_winding += cell.sides_by_winding;
+      band_.inside_samples += cell.inside_samples;
+      band_.doubtful_samples += cell.doubtful_samples;
       band_.overlap = band_.overlap || cell.overlap;
     }
   }
@@ -362,7 +362,8 @@ class Builder {
     for (int seed = 0; seed < size; ++seed) {
       if (steps[seed] >= 0) continue;
       const double w = winding_.winding(params_.voxel_mm * point(seed)), off = std::abs(w - 0.5);
-      const float sign = w > 0.5 ? -1.0F : 1.0F;
+      // On an outer wall the number lies between 0 and 1, and the sample counts as outside; on an inner one above 1.
+      const float sign = w > (distances[seed] < rounding_vox ? 0.98 : 0.5) ? -1.0F : 1.0F;
       steps[seed] = 0;
       values[seed] = sign * (topology_.closed() ? distances[seed]
                                                 : std::min(distances[seed], voxels_per_turn * static_cast<float>(off)));
@@ -388,15 +389,8 @@ class Builder {
         if ((i & 7) < 7) visit(i + 1);
       }
       if ((w > 1.5 || w < -0.5) && deepest > 0.75F) block.result.overlap = true;
-    }
-    const auto compare = [&](int i, int j) {
-      if ((values[i] < 0) == (values[j] < 0)) return;
-      (distances[i] + distances[j] > 1.05F ? block.result.sides_by_winding : block.result.sides_by_mesh) += 1;
-    };
-    for (int i = 0; i < size; ++i) {
-      if ((i >> 6) < 7) compare(i, i + 64);
-      if ((i >> 3 & 7) < 7) compare(i, i + 8);
-      if ((i & 7) < 7) compare(i, i + 1);
+      if (sign < 0) block.result.inside_samples += end;
+      if (sign < 0 && w < 0.75) block.result.doubtful_samples += end;
     }
   }
 
@@ -412,7 +406,7 @@ class Builder {
       std::uint64_t word = 0;
       for (openvdb::Index i = 0; i < 64; ++i) {
         float v = std::clamp(values[x * 64 + i], lowest, highest);
-        if (std::abs(v) < rounding_vox) v = nudge_vox;
+        if (std::abs(v) < rounding_vox) v = std::copysign(nudge_vox, v);
         word |= std::uint64_t{v > lowest && v < highest} << i;
         out[x * 64 + i] = voxel * v;
         negative = negative || v < 0;

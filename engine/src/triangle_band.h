@@ -22,8 +22,9 @@ struct BandParams {
 };
 struct Band {
   openvdb::FloatTree::Ptr tree;  ///< Background +outside, inner tiles and clamped values -inside, mm.
-  /// Pairs of neighbouring samples on different sides, with the mesh between them and without (by_winding only).
-  std::int64_t sides_by_mesh = 0, sides_by_winding = 0;
+  /// Samples inside and near the surface whose side was told by winding number, and those of them with a number below
+  /// 3/4: around a body with holes few, under an open sheet almost all.
+  std::int64_t inside_samples = 0, doubtful_samples = 0;
   std::int64_t cells_by_winding = 0;  ///< Cells of 64^3 samples with contradictions, decided by winding number.
   bool overlap = false;  ///< The mesh overlaps itself by more than a voxel (seen where the winding number was asked).
 };
