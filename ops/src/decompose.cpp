@@ -128,6 +128,7 @@ Anatomy make_anatomy(const Proxy& proxy, const DiameterField& field, const Conte
   Anatomy a;
   a.surface = &proxy.surface;
   a.field = &field;
+  a.volume_mm3 = proxy.solid.volume_mm3();
   a.graph = make_face_graph(proxy.surface);
   a.body = make_voxel_body(proxy.solid, context);
   context.check();

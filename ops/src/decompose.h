@@ -22,7 +22,8 @@ struct Anatomy {
   std::vector<std::int32_t> nearest;         ///< Per lattice sample: nearest inside sample.
   std::vector<std::int32_t> face_of_sample;  ///< Per inside sample: nearest face.
   std::vector<std::int32_t> sample_of_face;
-  Vec3d centre{};  ///< Of the body.
+  Vec3d centre{};         ///< Of the body.
+  double volume_mm3 = 0;  ///< Of the proxy.
 };
 [[nodiscard]] Anatomy make_anatomy(const Proxy& proxy, const DiameterField& field, const Context& context);
 

@@ -43,11 +43,7 @@ LabelSamples make_label_samples(const Anatomy& anatomy, const CutPieces& pieces,
   for (std::size_t at = 0; at < s.label.size(); ++at) s.label[at] = name_of(anatomy.nearest[at]);
   if (pieces.cuts.empty()) return s;
 
-  // How far outside samples are from the body, by their nearest inside sample.
-  const auto position = [&](std::size_t at) {
-    const Vec3i c = body.coordinates(static_cast<std::int32_t>(at));
-    return body.origin + h * Vec3d{static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z)};
-  };
+  // An outside sample near two cuts belongs to the nearer one.
   std::vector<float> decided(s.label.size(), std::numeric_limits<float>::infinity());
   for (std::size_t k = 0; k < pieces.cuts.size(); ++k) {
     const Section& cut = pieces.cuts[k];
@@ -58,15 +54,24 @@ LabelSamples make_label_samples(const Anatomy& anatomy, const CutPieces& pieces,
     beside.insert(beside.end(), pieces.severed[k].far.begin(), pieces.severed[k].far.end());
     // Through the body, so that a neighbouring limb that passes the disc closely knows nothing of the cut.
     const std::vector<float> way = geodesic(body, body.links, beside, 1.6 * s.clamp_mm + rim_vox * h);
-    for (std::size_t at = 0; at < s.label.size(); ++at) {
+    const double reach = radius + s.clamp_mm;
+    const auto sample = [&](double p, double origin, std::int32_t n) {
+      return std::clamp(static_cast<std::int32_t>(std::floor((p - origin) / h)), 0, n - 1);
+    };
+    const Vec3d middle = cut.frame.origin;
+    const Vec3i low{sample(middle.x - reach, s.origin.x, s.size.x), sample(middle.y - reach, s.origin.y, s.size.y),
+                    sample(middle.z - reach, s.origin.z, s.size.z)};
+    const Vec3i high{sample(middle.x + reach, s.origin.x, s.size.x), sample(middle.y + reach, s.origin.y, s.size.y),
+                     sample(middle.z + reach, s.origin.z, s.size.z)};
+    const auto look = [&](std::size_t at, Vec3d p) {
       const std::int32_t inside = anatomy.nearest[at];
       const float from_cut = way[static_cast<std::size_t>(inside)];
-      if (from_cut < 0) continue;
-      const Vec3d p = position(at);
+      if (from_cut < 0) return;
       const DiscDistance disc = disc_distance(cut.frame, radius, p);
       double mm = disc.mm;
+      if (mm >= s.clamp_mm) return;
       if (body.inside[at] < 0) {
-        if (norm(p - body.position(inside)) > outside_vox * h) continue;
+        if (norm(p - body.position(inside)) > outside_vox * h) return;
         const std::uint16_t owner = name_of(inside);
         if (disc.in_cylinder && (owner == a || owner == b) && static_cast<float>(mm) < decided[at]) {
           s.label[at] = disc.far_side ? b : a;
@@ -77,6 +82,17 @@ LabelSamples make_label_samples(const Anatomy& anatomy, const CutPieces& pieces,
         mm = std::max(mm, static_cast<double>(from_cut));
       }
       if (mm < s.clamp_mm) s.near.push_back({static_cast<std::int64_t>(at), a, b, static_cast<float>(mm)});
+    };
+    for (std::int32_t z = low.z; z <= high.z; ++z) {
+      for (std::int32_t y = low.y; y <= high.y; ++y) {
+        for (std::int32_t x = low.x; x <= high.x; ++x) {
+          const auto at =
+              (static_cast<std::size_t>(z) * static_cast<std::size_t>(s.size.y) + static_cast<std::size_t>(y)) *
+                  static_cast<std::size_t>(s.size.x) +
+              static_cast<std::size_t>(x);
+          look(at, s.origin + h * Vec3d{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)});
+        }
+      }
     }
   }
   std::stable_sort(s.near.begin(), s.near.end(), [](const auto& x, const auto& y) { return x.sample < y.sample; });

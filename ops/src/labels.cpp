@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -306,9 +308,12 @@ Labels make_labels(const LabelSamples& samples) {
     fields->cells[axis] = size[axis] - 1;
     fields->blocks_along[axis] = (fields->cells[axis] + block_cells - 1) / block_cells;
   }
-  for (int k = 0; k < fields->blocks_along[2]; ++k)
+  fields->blocks.resize(fields->block_at(0, 0, fields->blocks_along[2]));
+  tbb::parallel_for(0, fields->blocks_along[2], [&](int k) {
     for (int j = 0; j < fields->blocks_along[1]; ++j)
-      for (int i = 0; i < fields->blocks_along[0]; ++i) fields->blocks.push_back(make_block(samples, i, j, k));
+      for (int i = 0; i < fields->blocks_along[0]; ++i)
+        fields->blocks[fields->block_at(i, j, k)] = make_block(samples, i, j, k);
+  });
   auto impl = std::make_shared<Labels::Impl>();
   impl->fields = std::move(fields);
   impl->count = samples.count;

@@ -191,15 +191,19 @@ struct Described {
   int piece = 0;
 };
 
-std::vector<double> piece_volumes(const Anatomy& anatomy, const CutPieces& pieces) {
+// Samples count with the share of their cell that is inside; what rounding and kinks leave is spread evenly, so that
+// the parts add up to the proxy's own volume.
+std::vector<double> piece_volumes(const Anatomy& anatomy, const CutPieces& pieces, double all_mm3) {
   const VoxelBody& body = anatomy.body;
-  const double sample = body.voxel_mm * body.voxel_mm * body.voxel_mm;
   std::vector<double> volume(static_cast<std::size_t>(pieces.count), 0);
+  double sum = 0;
   for (std::size_t at = 0; at < body.distance.size(); ++at) {
     const double share = std::clamp(0.5 - static_cast<double>(body.distance[at]) / body.voxel_mm, 0.0, 1.0);
-    if (share > 0)
-      volume[static_cast<std::size_t>(pieces.of[static_cast<std::size_t>(anatomy.nearest[at])])] += share * sample;
+    if (share <= 0) continue;
+    volume[static_cast<std::size_t>(pieces.of[static_cast<std::size_t>(anatomy.nearest[at])])] += share;
+    sum += share;
   }
+  for (double& v : volume) v *= all_mm3 / sum;
   return volume;
 }
 
@@ -238,7 +242,7 @@ std::vector<Described> describe_all(const Anatomy& anatomy, const CutPieces& pie
                                     const std::vector<std::uint8_t>& limb_sample, double least_slenderness,
                                     const Context& context) {
   const std::vector<std::uint8_t> may_be_limb = limb_pieces(pieces, limb_sample);
-  const std::vector<double> volume = piece_volumes(anatomy, pieces);
+  const std::vector<double> volume = piece_volumes(anatomy, pieces, anatomy.volume_mm3);
   std::vector<Described> described(static_cast<std::size_t>(pieces.count));
   tbb::parallel_for(0, pieces.count, [&](int id) {
     const auto i = static_cast<std::size_t>(id);

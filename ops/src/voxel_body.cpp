@@ -24,6 +24,55 @@ struct Front {
 };
 using Wave = std::priority_queue<Front, std::vector<Front>, std::greater<>>;
 
+constexpr std::int32_t far_squared = 1 << 30;
+
+// Lower envelope of the parabolas (x - i)^2 + squared[i] along one line of samples.
+class Envelope {
+ public:
+  explicit Envelope(std::size_t length) : values_(length), owners_(length), vertex_(length), start_(length + 1) {}
+
+  void run(std::vector<std::int32_t>& owner, std::vector<std::int32_t>& squared, std::size_t first,
+           std::size_t stride) {
+    const auto n = static_cast<std::int64_t>(values_.size());
+    std::int64_t top = -1;
+    for (std::int64_t i = 0; i < n; ++i) {
+      const std::size_t at = first + static_cast<std::size_t>(i) * stride;
+      const auto k = static_cast<std::size_t>(i);
+      values_[k] = squared[at];
+      owners_[k] = owner[at];
+      if (values_[k] >= far_squared) continue;
+      // From where on this parabola is the lowest.
+      std::int64_t from = 0;
+      while (top >= 0) {
+        const std::int64_t v = vertex_[static_cast<std::size_t>(top)];
+        const std::int64_t rise = values_[k] + i * i - values_[static_cast<std::size_t>(v)] - v * v;
+        const std::int64_t run = 2 * (i - v);
+        from = rise < 0 ? 0 : rise / run + 1;  // the earlier one keeps a tie
+        if (from > start_[static_cast<std::size_t>(top)]) break;
+        --top;
+        from = 0;
+      }
+      ++top;
+      vertex_[static_cast<std::size_t>(top)] = i;
+      start_[static_cast<std::size_t>(top)] = top == 0 ? 0 : from;
+    }
+    if (top < 0) return;
+    std::int64_t piece = 0;
+    for (std::int64_t i = 0; i < n; ++i) {
+      while (piece < top && start_[static_cast<std::size_t>(piece + 1)] <= i) ++piece;
+      const std::int64_t v = vertex_[static_cast<std::size_t>(piece)];
+      const std::size_t at = first + static_cast<std::size_t>(i) * stride;
+      squared[at] = static_cast<std::int32_t>(values_[static_cast<std::size_t>(v)] + (i - v) * (i - v));
+      owner[at] = owners_[static_cast<std::size_t>(v)];
+    }
+  }
+
+ private:
+  std::vector<std::int64_t> values_;
+  std::vector<std::int32_t> owners_;
+  std::vector<std::int64_t> vertex_, start_;
+};
+
 void lay_out(VoxelBody& body, const Solid& solid) {
   const double h = solid.grid().voxel_mm;
   const Box3d box = solid.bounds_mm();
@@ -182,39 +231,22 @@ std::vector<float> geodesic(const VoxelBody& body, const Links& links, const std
 
 std::vector<std::int32_t> nearest_inside(const VoxelBody& body) {
   std::vector<std::int32_t> owner = body.inside;
-  std::vector<float> distance(owner.size(), std::numeric_limits<float>::infinity());
-  Wave wave;
-  for (std::size_t s = 0; s < body.count(); ++s) {
-    const std::int32_t at = body.lattice[s];
-    distance[static_cast<std::size_t>(at)] = 0;
-    for (const std::int32_t step : body.step) {
-      if (body.inside[static_cast<std::size_t>(at + step)] >= 0) continue;
-      wave.push({0, at});
-      break;
-    }
-  }
-  while (!wave.empty()) {
-    const Front front = wave.top();
-    wave.pop();
-    if (front.distance > distance[static_cast<std::size_t>(front.sample)]) continue;
-    const std::int32_t from = owner[static_cast<std::size_t>(front.sample)];
-    const Vec3i c = body.coordinates(front.sample);
-    const Vec3i source = body.coordinates(body.lattice[static_cast<std::size_t>(from)]);
-    for (int d = 0; d < VoxelBody::directions; ++d) {
-      const Vec3i o = body.offset[static_cast<std::size_t>(d)];
-      const Vec3i n{c.x + o.x, c.y + o.y, c.z + o.z};
-      if (n.x < 0 || n.y < 0 || n.z < 0 || n.x >= body.size.x || n.y >= body.size.y || n.z >= body.size.z) continue;
-      const auto at = static_cast<std::size_t>(front.sample + body.step[static_cast<std::size_t>(d)]);
-      // The true distance to the source is carried along, not the length of the way.
-      const double gap = std::hypot(static_cast<double>(n.x - source.x), static_cast<double>(n.y - source.y),
-                                    static_cast<double>(n.z - source.z));
-      const auto way = static_cast<float>(gap * body.voxel_mm);
-      if (way > distance[at] || (way == distance[at] && owner[at] <= from)) continue;
-      distance[at] = way;
-      owner[at] = from;
-      wave.push({way, static_cast<std::int32_t>(at)});
-    }
-  }
+  std::vector<std::int32_t> squared(owner.size(), far_squared);  // distance to the owner, voxels^2
+  for (const std::int32_t at : body.lattice) squared[static_cast<std::size_t>(at)] = 0;
+  const auto nx = static_cast<std::size_t>(body.size.x);
+  const auto ny = static_cast<std::size_t>(body.size.y);
+  const auto nz = static_cast<std::size_t>(body.size.z);
+  // Axis by axis: after the last one the owner is the nearest of all (Felzenszwalb and Huttenlocher 2012).
+  const auto pass = [&](std::size_t lines, std::size_t length, std::size_t stride, auto&& first_of) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lines, 64), [&](const auto& range) {
+      Envelope envelope(length);
+      for (std::size_t line = range.begin(); line < range.end(); ++line)
+        envelope.run(owner, squared, first_of(line), stride);
+    });
+  };
+  pass(ny * nz, nx, 1, [&](std::size_t l) { return l * nx; });
+  pass(nx * nz, ny, nx, [&](std::size_t l) { return l / nx * nx * ny + l % nx; });
+  pass(nx * ny, nz, nx * ny, [](std::size_t l) { return l; });
   return owner;
 }
 

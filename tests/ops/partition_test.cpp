@@ -85,8 +85,18 @@ Shape y_shape() {
   return unite({capsule({}, {0, 0, -40}, 6), capsule({}, {34, 0, 20}, 6), capsule({}, {-34, 0, 20}, 6)});
 }
 
+// Made once for the tests that only look.
+const Parted& finger() {
+  static const Parted made = parted(ball_with_finger(), finger_box, 1.2);
+  return made;
+}
+const Parted& animal() {
+  static const Parted made = parted(quadruped(), quadruped_box, 1.6);
+  return made;
+}
+
 TEST(Partition, AFingerOnABallIsCutOffAtItsRoot) {
-  const Parted p = parted(ball_with_finger(), finger_box, 0.9);
+  const Parted& p = finger();
   ASSERT_EQ(p.partition.candidates.size(), 2U);
   EXPECT_FALSE(p.partition.candidates[0].column_like);
   const Candidate& finger = p.partition.candidates[1];
@@ -108,12 +118,12 @@ TEST(Partition, AFingerOnABallIsCutOffAtItsRoot) {
 }
 
 TEST(Partition, AQuadrupedHasABodyAndFourLegs) {
-  const Parted p = parted(quadruped(), quadruped_box, 1.1);
+  const Parted& p = animal();
   ASSERT_EQ(p.partition.candidates.size(), 5U);
   EXPECT_FALSE(p.partition.candidates[0].column_like);
   double total = 0;
   for (const Candidate& c : p.partition.candidates) total += c.volume_mm3;
-  EXPECT_NEAR(total, p.proxy.solid.volume_mm3(), 0.002 * total);
+  EXPECT_NEAR(total, p.proxy.solid.volume_mm3(), 1e-9 * total);
   for (std::size_t i = 1; i < 5; ++i) {
     const Candidate& leg = p.partition.candidates[i];
     EXPECT_TRUE(leg.column_like) << leg.reason;
@@ -126,8 +136,8 @@ TEST(Partition, AQuadrupedHasABodyAndFourLegs) {
 }
 
 TEST(Partition, ATurnedModelHasTheSameParts) {
-  const Parted a = parted(quadruped(), quadruped_box, 1.1);
-  const Parted b = parted(quadruped(1), Box3d{{-20, -50, -62}, {20, 50, 20}}, 1.1);
+  const Parted& a = animal();
+  const Parted b = parted(quadruped(1), Box3d{{-20, -50, -62}, {20, 50, 20}}, 1.6);
   ASSERT_EQ(a.partition.candidates.size(), b.partition.candidates.size());
   for (const Candidate& c : a.partition.candidates) {
     const Vec3d at{-c.centroid_mm.y, c.centroid_mm.x, c.centroid_mm.z};
@@ -141,14 +151,14 @@ TEST(Partition, ATurnedModelHasTheSameParts) {
 }
 
 TEST(Partition, TheVoxelOfTheProxyDoesNotDecide) {
-  const Parted a = parted(quadruped(), quadruped_box, 1.1);
-  const Parted b = parted(quadruped(), quadruped_box, 0.8);
+  const Parted& a = animal();
+  const Parted b = parted(quadruped(), quadruped_box, 1.2);
   ASSERT_EQ(a.partition.candidates.size(), b.partition.candidates.size());
   EXPECT_EQ(columns(a.partition).size(), columns(b.partition).size());
 }
 
 TEST(Partition, ATorusIsOneRingWithItsCentreLine) {
-  const Parted p = parted(torus(Frame{}, 30, 6), Box3d{{-38, -38, -8}, {38, 38, 8}}, 1.0);
+  const Parted p = parted(torus(Frame{}, 30, 6), Box3d{{-38, -38, -8}, {38, 38, 8}}, 1.3);
   ASSERT_EQ(p.partition.candidates.size(), 1U);
   const Candidate& ring = p.partition.candidates[0];
   ASSERT_TRUE(ring.column_like) << ring.reason;
@@ -167,12 +177,12 @@ TEST(Partition, ATorusIsOneRingWithItsCentreLine) {
 }
 
 TEST(Partition, AYIsThreeLimbs) {
-  const Parted p = parted(y_shape(), y_box, 0.9);
+  const Parted p = parted(y_shape(), y_box, 1.2);
   ASSERT_EQ(p.partition.candidates.size(), 3U);
   EXPECT_EQ(columns(p.partition).size(), 3U);
   double total = 0;
   for (const Candidate& c : p.partition.candidates) total += c.volume_mm3;
-  EXPECT_NEAR(total, p.proxy.solid.volume_mm3(), 0.002 * total);
+  EXPECT_NEAR(total, p.proxy.solid.volume_mm3(), 1e-9 * total);
   // Each arm is a bar of radius 6 and length 40 with a round end: 4976 mm3 less or more of the fork.
   for (const Candidate& c : p.partition.candidates) {
     EXPECT_GT(c.volume_mm3, 4000);
@@ -185,7 +195,7 @@ TEST(Partition, AYIsThreeLimbs) {
 
 TEST(Partition, ABarThatRunsOnKeepsItsSideBranchOff) {
   const Shape t = unite({capsule({-40, 0, 0}, {40, 0, 0}, 6), capsule({}, {0, 0, 45}, 6)});
-  const Parted p = parted(t, Box3d{{-48, -8, -8}, {48, 8, 53}}, 0.9);
+  const Parted p = parted(t, Box3d{{-48, -8, -8}, {48, 8, 53}}, 1.2);
   ASSERT_EQ(p.partition.candidates.size(), 2U);
   EXPECT_TRUE(p.partition.candidates[0].column_like && p.partition.candidates[1].column_like);
   EXPECT_LT(degrees_between(p.partition.candidates[0].axis.mean(), {1, 0, 0}), 2);
@@ -194,7 +204,7 @@ TEST(Partition, ABarThatRunsOnKeepsItsSideBranchOff) {
 }
 
 TEST(Partition, TheAxisFollowsABentTube) {
-  const Parted p = parted(bent_tube(40, 6), Box3d{{-8, -8, -8}, {48, 8, 48}}, 0.8);
+  const Parted p = parted(bent_tube(40, 6), Box3d{{-8, -8, -8}, {48, 8, 48}}, 1.1);
   ASSERT_EQ(p.partition.candidates.size(), 1U);
   const Candidate& tube = p.partition.candidates[0];
   ASSERT_TRUE(tube.column_like) << tube.reason;
@@ -217,7 +227,7 @@ TEST(Partition, LumpsAreBulk) {
   const Box3d box{{-14, -14, -14}, {14, 14, 14}};
   for (const Shape& lump :
        {sphere({}, 10), cuboid({{-10, -10, -10}, {10, 10, 10}}), cuboid({{-12, -12, -2}, {12, 12, 2}})}) {
-    const Parted p = parted(lump, box, 0.7);
+    const Parted p = parted(lump, box, 1.0);
     ASSERT_EQ(p.partition.candidates.size(), 1U);
     EXPECT_FALSE(p.partition.candidates[0].column_like) << p.partition.candidates[0].reason;
     EXPECT_EQ(p.partition.labels.count(), 1);
@@ -227,7 +237,7 @@ TEST(Partition, LumpsAreBulk) {
 TEST(Partition, AHandleIsAColumnBetweenTwoCuts) {
   const Shape jug = unite({cuboid({{-30, -15, -20}, {30, 15, 0}}), capsule({-20, 0, -5}, {-20, 0, 25}, 4),
                            capsule({20, 0, -5}, {20, 0, 25}, 4), capsule({-20, 0, 25}, {20, 0, 25}, 4)});
-  const Parted p = parted(jug, Box3d{{-32, -17, -22}, {32, 17, 31}}, 1.0);
+  const Parted p = parted(jug, Box3d{{-32, -17, -22}, {32, 17, 31}}, 1.2);
   ASSERT_EQ(p.partition.candidates.size(), 2U);
   EXPECT_TRUE(p.partition.candidates[1].column_like) << p.partition.candidates[1].reason;
   ASSERT_EQ(p.partition.cuts.size(), 2U);
@@ -237,7 +247,7 @@ TEST(Partition, AHandleIsAColumnBetweenTwoCuts) {
 }
 
 TEST(Labels, EveryPointHasOneOwnerAndRegionsAgree) {
-  const Parted p = parted(quadruped(), quadruped_box, 1.1);
+  const Parted& p = animal();
   const Labels& labels = p.partition.labels;
   std::vector<Shape> regions;
   for (int i = 0; i < labels.count(); ++i) regions.push_back(labels.region(i));
@@ -265,7 +275,7 @@ TEST(Labels, EveryPointHasOneOwnerAndRegionsAgree) {
 }
 
 TEST(Labels, NearACutTheRegionIsThePlane) {
-  const Parted p = parted(ball_with_finger(), finger_box, 0.9);
+  const Parted& p = finger();
   const Cut& cut = p.partition.cuts[0];
   const Shape a = p.partition.labels.region(cut.a);
   const Shape b = p.partition.labels.region(cut.b);
@@ -283,7 +293,7 @@ TEST(Labels, ANeighbouringLimbKnowsNothingOfTheCut) {
   // root.
   const Shape shape =
       unite({ball_with_finger(), capsule({0, 14, 0}, {0, 16, 40}, 4), capsule({0, 16, 40}, {0, 30, 40}, 4)});
-  const Parted p = parted(shape, Box3d{{-22, -22, -22}, {22, 36, 67}}, 0.9);
+  const Parted p = parted(shape, Box3d{{-22, -22, -22}, {22, 36, 67}}, 1.2);
   for (const Cut& cut : p.partition.cuts) {
     for (int other = 0; other < p.partition.labels.count(); ++other) {
       if (other == cut.a || other == cut.b) continue;
@@ -294,7 +304,7 @@ TEST(Labels, ANeighbouringLimbKnowsNothingOfTheCut) {
 }
 
 TEST(Labels, BoundsHold) {
-  const Parted p = parted(quadruped(), quadruped_box, 1.1);
+  const Parted& p = animal();
   Random random(11, "boxes");
   for (int n = 0; n < 300; ++n) {
     const Vec3d corner{-60 + 120 * random.uniform(), -30 + 60 * random.uniform(), -70 + 100 * random.uniform()};
@@ -305,14 +315,14 @@ TEST(Labels, BoundsHold) {
     for (int k = 0; k < 40; ++k) {
       const Vec3d at = corner + side * Vec3d{random.uniform(), random.uniform(), random.uniform()};
       const float value = region(at);
-      EXPECT_GE(value, bound.lo);
-      EXPECT_LE(value, bound.hi);
+      EXPECT_GE(value, bound.lo - 1e-4F);  // the last digits of a float
+      EXPECT_LE(value, bound.hi + 1e-4F);
     }
   }
 }
 
 TEST(Labels, MergedPartsForgetTheBorderBetweenThem) {
-  const Parted p = parted(quadruped(), quadruped_box, 1.1);
+  const Parted& p = animal();
   const std::vector<int> name{0, 1, 0, 1, 0};
   const Labels merged = p.partition.labels.merged(name);
   EXPECT_EQ(merged.count(), 2);
@@ -337,7 +347,7 @@ TEST(Partition, SameBitsOnOneAndTwoThreads) {
   std::vector<Parted> runs;
   for (const std::size_t threads : {1, 2}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    runs.push_back(parted(quadruped(), quadruped_box, 1.3));
+    runs.push_back(parted(quadruped(), quadruped_box, 1.8));
   }
   const Partition& a = runs[0].partition;
   const Partition& b = runs[1].partition;

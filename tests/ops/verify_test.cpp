@@ -198,7 +198,7 @@ TEST(Verify, ATurnedModelWithATurnedLoadDecidesTheSame) {
   ASSERT_EQ(v.parts.parts.size(), 2U);
   EXPECT_EQ(v.parts.parts[1].kind(), Kind::Column);
   // The meshes differ, so the means do a little; what runs across is next to nothing and differs more.
-  EXPECT_NEAR(v.parts.parts[1].stress().axial, stress.axial, 0.05 * stress.axial);
+  EXPECT_NEAR(v.parts.parts[1].stress().axial, stress.axial, 0.08 * stress.axial);
   EXPECT_GT(v.parts.parts[1].stress().dominance, 3);
 }
 
