@@ -152,7 +152,7 @@ class RegionFunction final : public Shape::Function {
       });
       const float p = 0.5F * (own - other);
       // Every point has one owner: a tie is just inside the lower name and just outside the higher one.
-      out[i] = p != 0 ? p : (part_ < other_name ? -tie_mm : tie_mm);
+      out[i] = p != 0 ? std::clamp(p, -fields.clamp_mm, fields.clamp_mm) : (part_ < other_name ? -tie_mm : tie_mm);
     }
   }
 
