@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -26,12 +27,48 @@ double twice_area(const Points& points, openvdb::Index32 a, openvdb::Index32 b, 
   return norm(cross(at(points, b) - at(points, a), at(points, c) - at(points, a)));
 }
 
+/// Split each quad along its shorter diagonal, unless that leaves a triangle without area.
+Mesh::Triangle* split(const Points& points, const openvdb::Vec4I& q, Mesh::Triangle* out) {
+  const double d02 = norm(at(points, q[2]) - at(points, q[0])), d13 = norm(at(points, q[3]) - at(points, q[1]));
+  const auto flat = [&](int a, int b, int c) { return twice_area(points, q[a], q[b], q[c]) <= 0; };
+  bool first = d02 <= d13;
+  if (first ? flat(0, 1, 2) || flat(0, 2, 3) : flat(0, 1, 3) || flat(1, 2, 3)) first = !first;
+  // Quads of a level set wind inward: reverse.
+  if (first) {
+    *out++ = {q[0], q[2], q[1]};
+    *out++ = {q[0], q[3], q[2]};
+  } else {
+    *out++ = {q[0], q[3], q[1]};
+    *out++ = {q[1], q[3], q[2]};
+  }
+  return out;
+}
+
+/// Enclosed volume, either diagonal of a quad given half the say. Chunks are added in order: the same bits on any
+/// number of threads.
+double volume(const Points& points, const Quads& quads) {
+  constexpr std::size_t chunk = 65536;
+  std::vector<double> sums((quads.size() + chunk - 1) / chunk, 0.0);
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t c) {
+    for (std::size_t i = c * chunk; i < std::min(quads.size(), (c + 1) * chunk); ++i) {
+      std::array<Mesh::Triangle, 2> triangles;
+      split(points, quads[i], triangles.data());
+      for (const auto& t : triangles) sums[c] += dot(at(points, t[0]), cross(at(points, t[1]), at(points, t[2])));
+    }
+  });
+  double sum = 0;
+  for (const double s : sums) sum += s;
+  return sum / 6;
+}
+
 /// A mesh with its vertices on (or, as here, averaged below) a convex surface lies inside it and loses volume. To
 /// second order the loss is made good by moving each vertex along its normal by the normal part of its umbrella vector,
-/// mirrored: measured, spheres and cylinders three to sixteen voxels thick keep their volume within 1 to 4 %
-/// (tests/engine/surface_test.cpp). Flat faces and sharp edges stay where they are.
-void inflate(Points& points, const Quads& quads, double voxel) {
-  constexpr double sharp = 0.72, smooth = 0.86;
+/// mirrored; how far exactly is then set by the volume of the grid. Flat faces and sharp edges stay where they are: an
+/// edge is a bend beside something flat; a stick as thin as two voxels bends as much but has nothing flat around it.
+void inflate(Points& points, const Quads& quads, double voxel, double wanted_mm3) {
+  constexpr float sharp = 0.72F, smooth = 0.86F;  // flatness of a vertex: 1 on a face, cos 45 degrees on a box's edge
+  constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
+  const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
   struct Umbrella {
     float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours
     float nx = 0, ny = 0, nz = 0;  // sum of quad normals
@@ -55,36 +92,45 @@ void inflate(Points& points, const Quads& quads, double voxel) {
       u.edges += 2;
     }
   }
-  const double most = 0.35 * voxel;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const Umbrella& u = umbrellas[i];
-      const Vec3d sum{u.nx, u.ny, u.nz}, n = normalized(sum);
-      const double along = dot(Vec3d{u.x, u.y, u.z}, n) / std::max(u.edges, 1);
-      // 1 where flat, cos 45 degrees on the edge of a box: an edge is no curve and stays where it is.
-      const double flatness = u.length > 0 ? norm(sum) / u.length : 0;
-      const double share = std::clamp((flatness - sharp) / (smooth - sharp), 0.0, 1.0);
-      const Vec3d move = std::clamp(-share * along, -most, most) * n;
-      points[i] += openvdb::Vec3s(static_cast<float>(move.x), static_cast<float>(move.y), static_cast<float>(move.z));
-    }
-  });
-}
-
-/// Split each quad along its shorter diagonal, unless that leaves a triangle without area.
-Mesh::Triangle* split(const Points& points, const openvdb::Vec4I& q, Mesh::Triangle* out) {
-  const double d02 = norm(at(points, q[2]) - at(points, q[0])), d13 = norm(at(points, q[3]) - at(points, q[1]));
-  const auto flat = [&](int a, int b, int c) { return twice_area(points, q[a], q[b], q[c]) <= 0; };
-  bool first = d02 <= d13;
-  if (first ? flat(0, 1, 2) || flat(0, 2, 3) : flat(0, 1, 3) || flat(1, 2, 3)) first = !first;
-  // Quads of a level set wind inward: reverse.
-  if (first) {
-    *out++ = {q[0], q[2], q[1]};
-    *out++ = {q[0], q[3], q[2]};
-  } else {
-    *out++ = {q[0], q[3], q[1]};
-    *out++ = {q[1], q[3], q[2]};
+  std::vector<float> flatness(points.size()), flattest(points.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Umbrella& u = umbrellas[i];
+    flatness[i] = u.length > 0 ? std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz) / u.length : 0;
   }
-  return out;
+  for (const auto& q : quads) {
+    const float most = std::max(std::max(flatness[q[0]], flatness[q[1]]), std::max(flatness[q[2]], flatness[q[3]]));
+    for (int k = 0; k < 4; ++k) flattest[q[k]] = std::max(flattest[q[k]], most);
+  }
+  const double most = 0.35 * voxel;
+  std::vector<openvdb::Vec3s> moves(points.size());
+  const auto each_point = [&](const auto& work) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
+    });
+  };
+  each_point([&](std::size_t i) {
+    const Umbrella& u = umbrellas[i];
+    const Vec3d n = normalized(Vec3d{u.nx, u.ny, u.nz});
+    const double along = dot(Vec3d{u.x, u.y, u.z}, n) / std::max(u.edges, 1);
+    const float edge = (1 - ramp(flatness[i], sharp, smooth)) * ramp(flattest[i], bent, flat);
+    const Vec3d move = std::clamp((edge - 1) * along, -most, most) * n;
+    moves[i] = openvdb::Vec3s(static_cast<float>(move.x), static_cast<float>(move.y), static_cast<float>(move.z));
+  });
+  // Two steps or so: a quad's shorter diagonal may turn on the way. A field that is no distance may hold a volume that
+  // no such move can reach.
+  constexpr int rounds = 4;
+  constexpr double close_enough = 1e-3;
+  double now = volume(points, quads), moved = 0, step = 1;
+  for (int round = 0; round < rounds && step != 0; ++round) {
+    const double to = std::clamp(moved + step, 0.0, 2.0);
+    const auto more = static_cast<float>(to - moved);
+    each_point([&](std::size_t i) { points[i] += more * moves[i]; });
+    const double after = volume(points, quads), gained = after - now;
+    const bool done = gained == 0 || std::abs(after - wanted_mm3) <= close_enough * wanted_mm3;
+    step = done ? 0 : (wanted_mm3 - after) * (to - moved) / gained;
+    moved = to;
+    now = after;
+  }
 }
 
 bool degenerate(const Points& points, const openvdb::Vec4I& q) {
@@ -124,7 +170,7 @@ Mesh surface(const Solid& solid, const SurfaceParams& params, const Context& con
     throw Error(Code::TooLarge, "the surface has more vertices than a mesh can hold", {}, "use a larger --voxel");
   }
   const double voxel = solid.grid().voxel_mm;
-  if (params.keep_volume) inflate(points, quads, voxel);
+  if (params.keep_volume) inflate(points, quads, voxel, solid.volume_mm3());
   shake_degenerate(points, quads, voxel);
   context.check();
 

@@ -39,7 +39,7 @@ TEST_P(RealModels, GiveOneSoundPiece) {
   EXPECT_TRUE(counted.sound());
   const double volume = report["solid"]["volume_mm3"];
   // Members are two voxels thick here, to be quick; at the default voxel the bound is 1 % (tests/acceptance.cpp).
-  EXPECT_NEAR(counted.volume_mm3, volume, 0.03 * volume);
+  EXPECT_NEAR(counted.volume_mm3, volume, 0.01 * volume);
 }
 
 std::string case_name(const ::testing::TestParamInfo<Case>& tested) {
