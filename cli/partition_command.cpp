@@ -7,6 +7,7 @@
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/partition.h"
 #include "fibrolite/ops/picture.h"
+#include "fibrolite/ops/stance.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
@@ -106,22 +107,29 @@ void run_partition(const PartitionOptions& options) {
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
   if (options.voxel_mm) check_memory(model.mesh, *options.voxel_mm, recipe, InfillKind::Solid, options.run);
-  const Proxy proxy = stage("proxy", [&] { return make_proxy(model.mesh, {}, context.part(0.1, 0.2, "proxy")); });
+  // As generate does: parts are found as the model stands under its load.
+  const Frame stand = stance(recipe.verify);
+  const Proxy proxy = stage("proxy", [&] {
+    Proxy made = make_proxy(seen_from(stand, model.mesh), {}, context.part(0.1, 0.2, "proxy"));
+    made.frame = stand;
+    return made;
+  });
   const DiameterField field =
       stage("diameter", [&] { return diameter(proxy.surface, {}, context.part(0.2, 0.5, "diameter")); });
-  const Partition parts = stage(
-      "partition", [&] { return partition(proxy, field, recipe.partition, context.part(0.5, 0.8, "partition")); });
+  const Partition parts = stage("partition", [&] {
+    return placed(partition(proxy, field, recipe.partition, context.part(0.5, 0.8, "partition")), stand);
+  });
   fill_report(report, model, parts);
 
   // The parts are functions of space: they can be shown on a body as fine as is asked for.
-  const Solid body = !options.voxel_mm ? proxy.solid : stage("body", [&] {
-    return to_solid(model.mesh, {.grid = {.voxel_mm = *options.voxel_mm}}, context.part(0.8, 0.85, "body")).solid;
+  const double voxel = options.voxel_mm.value_or(proxy.solid.grid().voxel_mm);
+  const Solid body = stage("body", [&] {
+    return to_solid(model.mesh, {.grid = {.voxel_mm = voxel}}, context.part(0.8, 0.85, "body")).solid;
   });
   stage("write", [&] {
     for (const fs::path& file : options.output.files) {
       if (file.extension() == ".ply" || file.extension() == ".PLY") {
-        write_mesh(outputs.place(file), colored(options.voxel_mm ? surface(body, {}, context) : proxy.surface, parts),
-                   context);
+        write_mesh(outputs.place(file), colored(surface(body, {}, context), parts), context);
       } else {
         write_vdb(outputs.place(file), grids(body, parts, context), context);
       }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
 #include "cli/run_program.h"
@@ -177,13 +178,10 @@ void horse(Table& table) {
 }
 
 void molar(Table& table) {
-  // The paper's box of 80 x 50 x 40 mm.
-  const fs::path file = table.work / "molar-box.ply";
-  Mesh mesh = read_mesh(asset("molar")).mesh;
-  const Vec3d size = bounds(mesh).size(), wanted{40, 50, 80};
-  for (Vec3f& v : mesh.vertices)
-    v = to_float({v.x * wanted.x / size.x, v.y * wanted.y / size.y, v.z * wanted.z / size.z});
-  write_mesh(file, mesh);
+  const std::filesystem::path file = asset("molar");
+  const Vec3d size = bounds(read_mesh(file).mesh).size();  // the paper's box
+  table.row("molar: size", number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) + " mm",
+            norm(size - Vec3d{50, 40, 80}) < 0.1);
   std::map<std::string, double> mass;
   for (const char* infill : {"tcs", "hybrid", "mfs", "solid"}) {
     const json report = table.generate(std::string("molar-") + infill, file, {"--infill", infill});
@@ -266,15 +264,22 @@ void turned_models(Table& table) {
   for (int axis = 0; axis < 3; ++axis) {
     const fs::path file = table.work / "turned.ply";
     write_mesh(file, turned(mesh, axis, 1));
-    Mesh up;  // where z goes
-    up.vertices = {{0, 0, 1}};
-    const Vec3f z = turned(up, axis, 1).vertices.front();
-    const float part[3] = {z.x, z.y, z.z};
-    std::string direction;
-    for (int k = 0; k < 3; ++k)
-      if (std::abs(part[k]) > 0.5F) direction = std::string(part[k] < 0 ? "-" : "") + names[k];
+    const auto moved = [&](Vec3f v) {
+      Mesh one;
+      one.vertices = {v};
+      const Vec3d to = to_double(turned(one, axis, 1).vertices.front());
+      return Vec3d{std::round(to.x), std::round(to.y), std::round(to.z)};
+    };
+    // The load turns with the model: from above, and from where x has gone to.
+    const Vec3d z = moved({0, 0, 1}), x = moved({1, 0, 0});
+    const int up = z.x != 0 ? 0 : z.y != 0 ? 1 : 2;
+    const std::string direction = std::string(z[up] < 0 ? "-" : "") + names[up];
+    Vec3d zero{};  // where azimuth 0 points to: the next axis
+    (up == 0 ? zero.y : up == 1 ? zero.z : zero.x) = 1;
+    const double azimuth = std::atan2(dot(cross(zero, x), z), dot(zero, x)) * 180 / std::numbers::pi;
     const std::string name = std::string("turned about ") + names[axis];
-    const json report = table.generate(std::string("turned-") + names[axis], file, {"--up", direction});
+    const json report = table.generate(std::string("turned-") + names[axis], file,
+                                       {"--up", direction, "--set", "verify.azimuth_deg=" + number_text(azimuth)});
     if (report.is_null()) continue;
     check_same_parts(table, name, upright, report);
     table.row(name + ": volume of the solid / upright",

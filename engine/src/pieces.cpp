@@ -34,7 +34,7 @@ struct LeafLabels {
   std::vector<std::uint16_t> first;   // per label: its first voxel
 };
 
-LeafLabels label_leaf(const float* value) {
+LeafLabels label_leaf(const float* value, float below) {
   LeafLabels result;
   constexpr auto unset = std::numeric_limits<std::uint16_t>::max();
   result.label.fill(unset);
@@ -42,7 +42,7 @@ LeafLabels label_leaf(const float* value) {
   for (std::uint16_t seed = 0; seed < Leaf::SIZE; ++seed) {
     if (result.label[seed] != unset) continue;
     const auto id = static_cast<std::uint16_t>(result.voxels.size());
-    const bool inside = value[seed] < 0;
+    const bool inside = value[seed] < below;
     std::size_t top = 0;
     std::uint16_t count = 0;
     stack[top++] = seed;
@@ -52,11 +52,11 @@ LeafLabels label_leaf(const float* value) {
       ++count;
       for (unsigned axis = 0; axis < 3; ++axis) {
         const unsigned step = stride[axis], at = (v / step) & 7U;
-        if (at > 0 && result.label[v - step] == unset && (value[v - step] < 0) == inside) {
+        if (at > 0 && result.label[v - step] == unset && (value[v - step] < below) == inside) {
           result.label[v - step] = id;
           stack[top++] = static_cast<std::uint16_t>(v - step);
         }
-        if (at < 7 && result.label[v + step] == unset && (value[v + step] < 0) == inside) {
+        if (at < 7 && result.label[v + step] == unset && (value[v + step] < below) == inside) {
           result.label[v + step] = id;
           stack[top++] = static_cast<std::uint16_t>(v + step);
         }
@@ -68,10 +68,11 @@ LeafLabels label_leaf(const float* value) {
   return result;
 }
 
-/// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels.
+/// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what reads less
+/// than `below`, 0 or a depth within the band.
 class Components {
  public:
-  Components(const Solid& solid, const Context& context) : solid_(solid) {
+  Components(const Solid& solid, const Context& context, float below = 0) : solid_(solid), below_(below) {
     const Tree& tree = solid.impl().grid->tree();
     openvdb::CoordBBox box;
     tree.evalLeafBoundingBox(box);
@@ -131,7 +132,9 @@ class Components {
     if (block_[i] < 0) return find(offset_[i]);
     return find(offset_[i] + leaves_[static_cast<std::size_t>(block_[i])].label[Leaf::coordToOffset(ijk)]);
   }
-  [[nodiscard]] bool inside(const openvdb::Coord& ijk) const { return solid_.impl().grid->tree().getValue(ijk) < 0; }
+  [[nodiscard]] bool inside(const openvdb::Coord& ijk) const {
+    return solid_.impl().grid->tree().getValue(ijk) < below_;
+  }
 
   /// Calls visit(origin, leaf labels or null for a tile, global id of label 0) for each block, in scan order.
   template <class Visit>
@@ -193,7 +196,7 @@ class Components {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
       if (context.cancelled()) return;
       for (std::size_t i = range.begin(); i < range.end(); ++i)
-        leaves_[i] = label_leaf(tree_leaves_[i]->buffer().data());
+        leaves_[i] = label_leaf(tree_leaves_[i]->buffer().data(), below_);
     });
     context.check();
     offset_.resize(block_.size() + 1);
@@ -248,8 +251,8 @@ class Components {
     for (unsigned i = 0; i < 8; ++i) {
       for (unsigned j = 0; j < 8; ++j) {
         const unsigned pa = 7 * s + i * u + j * v, pb = i * u + j * v;
-        const bool ia = va != nullptr ? va[pa] < 0 : block_[a] == full_tile;
-        const bool ib = vb != nullptr ? vb[pb] < 0 : block_[b] == full_tile;
+        const bool ia = va != nullptr ? va[pa] < below_ : block_[a] == full_tile;
+        const bool ib = vb != nullptr ? vb[pb] < below_ : block_[b] == full_tile;
         if (ia != ib) continue;
         const Id la = offset_[a] + (va != nullptr ? leaves_[static_cast<std::size_t>(block_[a])].label[pa] : 0U);
         const Id lb = offset_[b] + (vb != nullptr ? leaves_[static_cast<std::size_t>(block_[b])].label[pb] : 0U);
@@ -263,6 +266,7 @@ class Components {
   }
 
   Solid solid_;
+  float below_;
   openvdb::Coord low_, n_;
   std::vector<std::int32_t> block_;  // leaf number or a tile kind
   std::vector<const Leaf*> tree_leaves_;
@@ -355,6 +359,51 @@ CleanResult clean(const Solid& solid, const CleanParams& params, const Context& 
   });
   result.solid = make_solid(grid, solid.grid());
   return result;
+}
+
+std::vector<Piece> unreached(const Solid& solid, const Shape& anchor, double neck_mm, const Context& context) {
+  const Grid grid = solid.grid();
+  // A member of this width keeps a chain of neighbouring samples this deep, however it lies on the lattice.
+  const double depth = std::clamp(0.5 * neck_mm - grid.voxel_mm, 0.0, (grid.band_vox - 0.5) * grid.voxel_mm);
+  const Components components(solid, context, -static_cast<float>(depth));
+  if (components.empty()) return {};
+  auto list = components.list();
+  std::vector<Id> loose;
+  for (const auto& c : list)
+    if (c.inside) loose.push_back(c.id);
+  std::sort(loose.begin(), loose.end());
+  std::vector<bool> reached(loose.size(), false);
+  components.each_block([&](const openvdb::Coord& origin, const LeafLabels* labels, Id offset) {
+    // Most blocks hold nothing but what is known to be reached: no need to ask for the anchor there.
+    const std::size_t kinds = labels != nullptr ? labels->voxels.size() : 1;
+    std::vector<std::size_t> open(kinds, loose.size());
+    bool any = false;
+    for (std::size_t k = 0; k < kinds; ++k) {
+      const Id id = components.find(offset + static_cast<Id>(k));
+      const auto at = std::lower_bound(loose.begin(), loose.end(), id);
+      if (at == loose.end() || *at != id) continue;
+      open[k] = static_cast<std::size_t>(at - loose.begin());
+      any = any || !reached[open[k]];
+    }
+    if (!any) return;
+    std::array<float, Leaf::SIZE> x, y, z, value;
+    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+      const Vec3f p = to_float(world(origin + Leaf::offsetToLocalCoord(i), grid.voxel_mm));
+      x[i] = p.x, y[i] = p.y, z[i] = p.z;
+    }
+    const Vec3i leaf{origin.x(), origin.y(), origin.z()};
+    anchor.evaluate({x.data(), y.data(), z.data(), Leaf::SIZE, &leaf, grid.voxel_mm}, value.data());
+    for (std::size_t i = 0; i < Leaf::SIZE; ++i) {
+      const std::size_t slot = open[labels != nullptr ? labels->label[i] : 0];
+      if (slot < loose.size() && value[i] < 0) reached[slot] = true;
+    }
+  });
+  std::erase_if(list, [&](const Components::Component& c) {
+    const auto slot = std::lower_bound(loose.begin(), loose.end(), c.id) - loose.begin();
+    return !c.inside || reached[static_cast<std::size_t>(slot)];
+  });
+  list.insert(list.begin(), {0, false, 0, {}});  // where summarize() expects the exterior
+  return summarize(list, grid.voxel_mm).material;
 }
 
 std::vector<Gap> gaps(const Solid& solid, double reach_mm, const Context& context) {

@@ -128,6 +128,7 @@ Anatomy make_anatomy(const Proxy& proxy, const DiameterField& field, const Conte
   Anatomy a;
   a.surface = &proxy.surface;
   a.field = &field;
+  a.frame = proxy.frame;
   a.volume_mm3 = proxy.solid.volume_mm3();
   a.graph = make_face_graph(proxy.surface);
   a.body = make_voxel_body(proxy.solid, context);
@@ -233,7 +234,7 @@ Limbs find_limbs(const Anatomy& anatomy, double threshold, double min_area, doub
         ++limbs.count;
         kept.push_back(std::move(candidate));
       } else {
-        const Vec3d at = seg.regions[r].loops.front().centre;
+        const Vec3d at = anatomy.frame.to_world(seg.regions[r].loops.front().centre);
         limbs.notes.push_back("the thin region at (" + number_text(at.x, 4) + ", " + number_text(at.y, 4) + ", " +
                               number_text(at.z, 4) + ") mm joins its neighbour: " + v.why_not);
       }

@@ -24,6 +24,7 @@ struct Anatomy {
   std::vector<std::int32_t> sample_of_face;
   Vec3d centre{};         ///< Of the body.
   double volume_mm3 = 0;  ///< Of the proxy.
+  Frame frame;            ///< Of the proxy, for places told to the user.
 };
 [[nodiscard]] Anatomy make_anatomy(const Proxy& proxy, const DiameterField& field, const Context& context);
 

@@ -3,9 +3,11 @@
 #include "fibrolite/ops/hybridize.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "fibrolite/ops/assemble.h"
 #include "fibrolite/ops/measure.h"
+#include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/tie.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
@@ -22,15 +24,26 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   Hybrid out;
 
   // Parts (paper Sec. 4): everything that must not depend on the voxel is decided on a proxy and on the mesh itself.
+  std::function<double(Vec3d, Vec3d)> traction_mpa;
   if (params.infill == InfillKind::Hybrid) {
-    const Proxy proxy = run("proxy", 0.02, [&](const Context& c) { return make_proxy(model.mesh, {}, c); });
+    // Decided as the model stands under its load, however both lie in the file.
+    const Frame stand = stance(recipe.verify);
+    const VerifyParams load = in_stance(recipe.verify);
+    const Proxy proxy = run("proxy", 0.02, [&](const Context& c) {
+      Proxy made = make_proxy(seen_from(stand, model.mesh), {}, c);
+      made.frame = stand;
+      return made;
+    });
     const DiameterField field = run("diameter", 0.08, [&](const Context& c) { return diameter(proxy.surface, {}, c); });
     const Partition cut =
         run("partition", 0.12, [&](const Context& c) { return partition(proxy, field, recipe.partition, c); });
     const Verification verified =
-        run("verify", 0.35, [&](const Context& c) { return verify(proxy, cut, recipe.verify, recipe.material, c); });
+        run("verify", 0.35, [&](const Context& c) { return verify(proxy, cut, load, recipe.material, c); });
     report_decisions(cut, verified, report);
-    out.parts = verified.parts;
+    out.parts = placed(verified.parts, stand);
+    traction_mpa = [stand, standing = verified.traction_mpa](Vec3d p, Vec3d n) {
+      return standing(stand.to_local(p), stand.to_local(n));
+    };
   } else {
     out.parts = whole_body(model.mesh, params.infill == InfillKind::Mfs ? Kind::Column : Kind::Bulk);
   }
@@ -42,10 +55,13 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   run("infill", 0.40, [&](const Context&) {
     for (const Part& part : out.parts.parts) fills.push_back(fill(part, params.infill, recipe, out.body));
   });
+  std::vector<double> demand_n;
   run("joints", 0.45, [&](const Context& c) {
     if (!recipe.joint.enabled || out.parts.parts.size() < 2) return;
     out.interfaces = interfaces(out.parts, out.body, section_pixel(recipe), c);
     out.joints = join_all(out.parts, out.interfaces, fills, recipe, out.body, c);
+    for (const Interface& i : out.interfaces)
+      demand_n.push_back(fibrolite::demand_n(i, out.parts.labels, out.body, traction_mpa));
   });
 
   // One composed shape, made into voxels once, in one piece.
@@ -68,8 +84,9 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     std::vector<Shape> regions;
     for (const Part& part : out.parts.parts) regions.push_back(part.region());
     report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
-    report_joints(out.interfaces, out.joints, report);
+    report_joints(out.interfaces, out.joints, demand_n, recipe.material, report);
     report_solid(tied, body, recipe.material, report);
+    report_weak_places(out.parts, fills, body, out.solid, recipe, params.infill, report, c);
   });
   if (params.steps) out.steps = steps(body, raw, out, fills, tied.struts, assembly);
   return out;

@@ -76,6 +76,25 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
   return result;
 }
 
+double demand_n(const Interface& section, const Labels& labels, const Shape& body,
+                const std::function<double(Vec3d, Vec3d)>& traction_mpa) {
+  constexpr int across = 36;  // a disc of this many pixels has about a thousand
+  const double pixel = 2 * section.radius_mm / across;
+  const PlaneGrid grid = PlaneGrid::about(section.frame, section.radius_mm, pixel, 1);
+  const FloatImage depth = sample(body, grid);
+  double sum = 0;
+  int points = 0;
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i) {
+      if (depth(i, j) >= 0 || norm(grid.local(i, j)) > section.radius_mm) continue;
+      if (labels.label(grid.world(i, j, -pixel)) != section.a || labels.label(grid.world(i, j, pixel)) != section.b)
+        continue;
+      sum += traction_mpa(grid.world(i, j, 0), section.frame.z);
+      ++points;
+    }
+  return points > 0 ? sum / points * section.area_mm2 : 0;
+}
+
 std::vector<Interface> interfaces(const Parts& parts, const Shape& body, double pixel_mm, const Context& context) {
   if (!(pixel_mm > 0)) throw Error(Code::BadRecipe, "the pixel must be above zero", "interfaces", "use 0.1 mm");
   std::vector<Interface> all;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "fibrolite/error.h"
@@ -100,13 +101,14 @@ struct Labels::Impl {
   std::shared_ptr<const Fields> fields;  // none: one label everywhere
   std::vector<int> name;                 // of each stored label
   int count = 1;
+  std::optional<Frame> frame{};  // whose coordinates the fields are given in; none: the world's
 
   [[nodiscard]] int label(Vec3d p) const;
 };
 
 int Labels::Impl::label(Vec3d p) const {
   if (!fields) return 0;
-  const Place at = fields->place(p);
+  const Place at = fields->place(frame ? frame->to_local(p) : p);
   int best = 0;
   float best_phi = far_mm;
   fields->each_label(fields->blocks[at.block], at, [&](std::uint16_t stored, float phi) {
@@ -271,7 +273,7 @@ Block make_block(const LabelSamples& s, int bi, int bj, int bk) {
 
 }  // namespace
 
-Labels::Labels() : impl_(std::make_shared<Impl>(Impl{nullptr, {0}, 1})) {}
+Labels::Labels() : impl_(std::make_shared<Impl>(Impl{nullptr, {0}, 1, {}})) {}
 Labels::Labels(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 int Labels::count() const { return impl_->count; }
@@ -283,7 +285,8 @@ Shape Labels::region(int i) const {
                 "ask for 0 to " + std::to_string(impl_->count - 1));
   }
   if (!impl_->fields || impl_->count == 1) return everything();
-  return Shape(std::make_shared<RegionFunction>(impl_, i));
+  Shape region(std::make_shared<RegionFunction>(impl_, i));
+  return impl_->frame ? fibrolite::placed(std::move(region), *impl_->frame) : region;
 }
 
 Labels Labels::merged(const std::vector<int>& part_of_candidate) const {
@@ -293,8 +296,15 @@ Labels Labels::merged(const std::vector<int>& part_of_candidate) const {
   }
   auto impl = std::make_shared<Impl>();
   impl->fields = impl_->fields;
+  impl->frame = impl_->frame;
   impl->count = 1 + *std::max_element(part_of_candidate.begin(), part_of_candidate.end());
   for (const int old : impl_->name) impl->name.push_back(part_of_candidate[static_cast<std::size_t>(old)]);
+  return Labels(std::move(impl));
+}
+
+Labels Labels::placed(const Frame& frame) const {
+  auto impl = std::make_shared<Impl>(*impl_);
+  impl->frame = frame;
   return Labels(std::move(impl));
 }
 

@@ -118,7 +118,7 @@ std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint
   return shares;
 }
 
-std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg) {
+Vec3d slanted_from(Vec3d up, double azimuth_deg) {
   const std::array<Vec3d, 3> world{Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}};
   std::size_t nearest = 2;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -127,8 +127,11 @@ std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg) {
   const Vec3d next = world[(nearest + 1) % 3];
   const Vec3d level = normalized(next - dot(next, up) * up);
   const double angle = azimuth_deg * std::numbers::pi / 180;
-  const Vec3d from = std::cos(angle) * level + std::sin(angle) * cross(up, level);
-  return {-up, normalized(-(up + from))};
+  return std::cos(angle) * level + std::sin(angle) * cross(up, level);
+}
+
+std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg) {
+  return {-up, normalized(-(up + slanted_from(up, azimuth_deg)))};
 }
 
 }  // namespace fibrolite

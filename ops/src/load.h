@@ -43,6 +43,8 @@ struct Footprint {
 [[nodiscard]] std::vector<double> nodal_shares(const TetMesh& mesh, const Footprint& footprint, double tolerance_mm,
                                                const std::function<bool(Vec3d)>& mine);
 
+/// The level unit direction that the slanted load comes from, for a unit vector `up`: see load_directions().
+[[nodiscard]] Vec3d slanted_from(Vec3d up, double azimuth_deg);
 /// Unit directions of the two load cases: straight down, and 45 degrees from it, coming from `azimuth_deg` about `up`.
 /// Azimuth 0 is the next world axis after the one nearest to `up` (x for z, y for x, z for y), made level.
 [[nodiscard]] std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg);

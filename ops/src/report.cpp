@@ -55,7 +55,7 @@ Json to_json(const InterfaceReport& interface) {
           {"union_area_mm2", interface.union_area_mm2},
           {"bridge_area_mm2", interface.bridge_area_mm2},
           {"contact_area_mm2", interface.contact_area_mm2},
-          {"capacity_over_demand", nullptr}};  // needs the stress at the interface, which no run resolves
+          {"capacity_over_demand", interface.capacity_over_demand}};
 }
 
 Json to_json(const SolidReport& solid) {

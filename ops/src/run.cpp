@@ -25,7 +25,7 @@ Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& b
   const std::string name = infill_of(part, run);
   if (name == "tcs") return generate(part, recipe.tcs);
   if (name == "mfs") return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
-  return {everything(), 0, {}};
+  return {.shape = everything()};
 }
 
 double section_pixel(const Recipe& recipe) { return std::min(0.25 * recipe.mfs.wall_mm, 0.1); }

@@ -54,7 +54,12 @@ class Run {
 void report_decisions(const Partition& partition, const Verification& verification, Report& report);
 void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std::vector<PartVolumes>& volumes,
                   InfillKind infill, Report& report);
-void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints, Report& report);
+/// `demand_n`: one per interface.
+void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
+                   const std::vector<double>& demand_n, const Material& material, Report& report);
 void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
+/// What hangs free, and what hangs on the shell by too thin a neck.
+void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
+                        const Recipe& recipe, InfillKind infill, Report& report, const Context& context);
 
 }  // namespace fibrolite

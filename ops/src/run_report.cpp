@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fibrolite/ops/dangling.h"
+#include "fibrolite/pieces.h"
+#include "fibrolite/realize.h"
 #include "run.h"
 
 namespace fibrolite {
@@ -44,7 +47,8 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
   }
 }
 
-void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints, Report& report) {
+void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
+                   const std::vector<double>& demand_n, const Material& material, Report& report) {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const Joint& joint = joints[i];
     InterfaceReport row;
@@ -63,6 +67,7 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
         joint.layer.pixel_mm * joint.layer.pixel_mm *
         static_cast<double>(std::count(joint.layer.solid.pixels.begin(), joint.layer.solid.pixels.end(), 1));
     row.contact_area_mm2 = joint.contact_area_mm2;
+    row.capacity_over_demand = joint.contact_area_mm2 * material.yield_mpa / demand_n[i];  // no demand: infinite, null
     report.interfaces.push_back(row);
     append(report.warnings, joint.warnings);
   }
@@ -87,6 +92,23 @@ void report_solid(const Tied& tied, const Solid& body, const Material& material,
     report.warnings.push_back("the solid has " + std::to_string(out.pieces) +
                               " pieces: the model itself has pieces too far apart to tie");
   }
+}
+
+void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
+                        const Recipe& recipe, InfillKind infill, Report& report, const Context& context) {
+  const Shape depth = distance_to(body);
+  const double shell_mm = recipe.shell.thickness_mm;
+  for (std::size_t i = 0; i < fills.size(); ++i) {
+    report.solid.dangling += fills[i].free_edges;
+    if (!fills[i].sticks) continue;
+    const Part& part = parts.parts[i];
+    report.solid.dangling +=
+        dangling_sticks(fills[i], part.bounds_mm(), part.region(), depth, shell_mm, solid, context);
+  }
+  const double thinnest = thinnest_mm(recipe, infill);
+  if (!std::isfinite(thinnest)) return;
+  report.solid.unreached =
+      static_cast<std::int64_t>(unreached(solid, shell(depth, shell_mm), thinnest, context).size());
 }
 
 }  // namespace fibrolite

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <tuple>
@@ -50,6 +51,27 @@ struct Setting {
 struct Model {
   TetMesh mesh;
   std::vector<fem::Solution> solutions;  // one per load case
+};
+
+/// The solved body and the way to a place in it.
+struct Whole {
+  explicit Whole(Model solved) : model(std::move(solved)), locator(model.mesh) {}
+  Whole(const Whole&) = delete;
+  Whole& operator=(const Whole&) = delete;
+
+  [[nodiscard]] double traction_mpa(Vec3d p, Vec3d n) const {
+    const std::uint32_t tet = locator.find(p).tet;
+    double most = 0;
+    for (const fem::Solution& s : model.solutions) {
+      const fem::Stress& t = s.centroid_stress[tet];
+      most = std::max(most, norm(Vec3d{t[0] * n.x + t[3] * n.y + t[5] * n.z, t[3] * n.x + t[1] * n.y + t[4] * n.z,
+                                       t[5] * n.x + t[4] * n.y + t[2] * n.z}));
+    }
+    return most;
+  }
+
+  const Model model;
+  const fem::Locator locator;
 };
 
 std::vector<fem::LoadCase> load_cases(const TetMesh& mesh, const Setting& setting,
@@ -333,14 +355,17 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     context.progress(0.4 * ++done / static_cast<double>(count + 1));
   });
 
-  const Model body = solve_body(std::move(*body_mesh), params, setting, context.part(0.4, 0.65, "verify"));
+  const auto whole = std::make_shared<const Whole>(
+      solve_body(std::move(*body_mesh), params, setting, context.part(0.4, 0.65, "verify")));
+  const Model& body = whole->model;
+  const fem::Locator& locator = whole->locator;
+  result.traction_mpa = [whole](Vec3d p, Vec3d n) { return whole->traction_mpa(p, n); };
   account(result, body, params.load_n);
   std::vector<double> body_von_mises;
   for (const fem::Solution& s : body.solutions) {
     body_von_mises.push_back(mean_in_world(body.mesh, s.centroid_stress, all_tets(body.mesh)).von_mises);
   }
 
-  const fem::Locator locator(body.mesh);
   std::vector<Verdict> verdicts(count);
   std::vector<std::optional<Model>> components(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {

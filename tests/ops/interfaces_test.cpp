@@ -80,6 +80,16 @@ TEST(Interfaces, ARoundSectionHasTheAreaOfItsCircle) {
   EXPECT_NEAR(found[0].frame.z.z, 1, 1e-12) << "from a into b";
 }
 
+TEST(Interfaces, TheDemandIsTheIntegralOfTheTraction) {
+  const Parts parts =
+      parts_of({Kind::Column, Kind::Bulk}, halves([](double) { return 1; }, 2), {cut_at_origin(0, 1, 8)});
+  const Interface section = interfaces(parts, limb, 0.1).at(0);
+  EXPECT_NEAR(demand_n(section, parts.labels, limb, [](Vec3d, Vec3d) { return 2; }), 50 * pi, 0.5 * pi);
+  // Rising linearly across the section, 0 at one rim: half of the largest on average.
+  const double rising = demand_n(section, parts.labels, limb, [](Vec3d p, Vec3d n) { return (p.x + 3) * n.z; });
+  EXPECT_NEAR(rising, 25 * pi * 5, 0.03 * 25 * pi * 5);
+}
+
 TEST(Interfaces, TheColumnComesFirstAndTheFrameTurns) {
   const Parts parts =
       parts_of({Kind::Bulk, Kind::Column}, halves([](double) { return 1; }, 2), {cut_at_origin(0, 1, 8)});

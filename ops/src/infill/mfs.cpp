@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <utility>
@@ -28,6 +29,8 @@ class Membranes final : public Shape::Function {
     corner_y_ = static_cast<float>(center_mm.y - 0.5 * (image_.distance_mm.height - 1) * image_.pixel_mm);
     const auto [lo, hi] = std::minmax_element(image_.distance_mm.pixels.begin(), image_.distance_mm.pixels.end());
     range_ = {*lo, *hi};
+    const double reach = 0.5 * std::hypot(image_.width_mm(), image_.height_mm()) + norm(center_mm);
+    sweep_lipschitz_ = 1.02 * std::hypot(1, reach * sweep_.twist_per_mm());
   }
 
   void evaluate(const PointBlock& block, float* out) const override {
@@ -45,18 +48,17 @@ class Membranes final : public Shape::Function {
     const Vec3f c = to_float(box.center());
     float value = 0;
     evaluate({&c.x, &c.y, &c.z, 1}, &value);
-    const auto reach = static_cast<float>(sweep_lipschitz * 0.5 * norm(box.size()) + 1.5 * image_.pixel_mm);
+    const auto reach = static_cast<float>(sweep_lipschitz_ * 0.5 * norm(box.size()) + 1.5 * image_.pixel_mm);
     return {std::max(range_.lo, value - reach), std::min(range_.hi, value + reach)};
   }
 
   /// Between the samples of a 1-Lipschitz image the bilinear slope is at most 1 along each axis, so sqrt(2).
-  [[nodiscard]] double lipschitz() const override { return sweep_lipschitz * std::sqrt(2.0); }
+  [[nodiscard]] double lipschitz() const override { return sweep_lipschitz_ * std::sqrt(2.0); }
 
  private:
-  static constexpr double sweep_lipschitz = 1.02;  // 1 along a smooth line; stations of 0.08 rad add less than this
-
   MembraneImage image_;
   Sweep sweep_;
+  double sweep_lipschitz_ = 1.02;  // 1 along a smooth line; stations of 0.08 rad add less than this
   float per_pixel_ = 1, corner_x_ = 0, corner_y_ = 0;
   Interval range_{0, 0};
 };
@@ -124,8 +126,41 @@ LumenSection lumen_section(const Shape& lumen, const Frame& frame, const Extent&
   return section;
 }
 
+/// Membranes that end in a void: a circle about the end of one, wider than the membrane, meets material once and over
+/// less than half its length; about a wall it meets material twice, about a junction three times or more.
+int count_free_edges(const FloatImage& wall, const FloatImage& lumen, double wall_mm, double pixel_mm) {
+  constexpr int probes = 48;
+  constexpr double wider = 1.3, most = 0.4;
+  Image<std::uint8_t> ends(wall.width, wall.height);
+  for (int j = 0; j < wall.height; ++j)
+    for (int i = 0; i < wall.width; ++i) {
+      const auto depth = static_cast<double>(-wall(i, j));
+      if (depth < 0.4 * wall_mm || static_cast<double>(lumen(i, j)) > -wider * depth) continue;
+      const double radius_px = wider * depth / pixel_mm;
+      int material = 0, starts = 0;
+      bool before = true;
+      for (int k = 0; k <= probes; ++k) {
+        const double turn = 2 * std::numbers::pi * k / probes;
+        const float v = bilinear(wall, static_cast<float>(i + radius_px * std::cos(turn)),
+                                 static_cast<float>(j + radius_px * std::sin(turn)));
+        const bool now = v < 0;
+        if (k > 0) {
+          material += now ? 1 : 0;
+          starts += now && !before ? 1 : 0;
+        }
+        before = now;
+      }
+      ends(i, j) = starts == 1 && material < most * probes;
+    }
+  return regions_of(ends).count;
+}
+
+struct SectionCount {
+  int fibres = 0, free_edges = 0;
+};
+
 /// Voids inside the lumen of a section, by connected regions of the membrane image itself.
-int count_fibres(const LumenSection& section, const Shape& membranes, double wall_mm, double pixel_mm) {
+SectionCount count_fibres(const LumenSection& section, const Shape& membranes, double wall_mm, double pixel_mm) {
   PlaneGrid fine = section.grid;
   const double zoom = fine.pixel_mm / pixel_mm;
   fine.pixel_mm = pixel_mm;
@@ -133,15 +168,17 @@ int count_fibres(const LumenSection& section, const Shape& membranes, double wal
   fine.height = static_cast<int>((section.grid.height - 1) * zoom) + 1;
   const FloatImage wall = sample(membranes, fine);
   Image<std::uint8_t> voids(fine.width, fine.height);
+  FloatImage lumen(fine.width, fine.height);
   for (int j = 0; j < fine.height; ++j)
     for (int i = 0; i < fine.width; ++i) {
-      const float lumen = bilinear(section.value, static_cast<float>(i / zoom), static_cast<float>(j / zoom));
-      voids(i, j) = lumen < 0 && wall(i, j) > 0;
+      lumen(i, j) = bilinear(section.value, static_cast<float>(i / zoom), static_cast<float>(j / zoom));
+      voids(i, j) = lumen(i, j) < 0 && wall(i, j) > 0;
     }
   const Regions found = regions_of(voids);
   const double least_px = wall_mm * wall_mm / 4 / (pixel_mm * pixel_mm);  // slits at the shell are no fibres
-  return static_cast<int>(std::count_if(found.pixels.begin(), found.pixels.end(),
-                                        [&](std::int64_t n) { return static_cast<double>(n) >= least_px; }));
+  const auto fibres = std::count_if(found.pixels.begin(), found.pixels.end(),
+                                    [&](std::int64_t n) { return static_cast<double>(n) >= least_px; });
+  return {static_cast<int>(fibres), count_free_edges(wall, lumen, wall_mm, pixel_mm)};
 }
 
 void check(const MfsParams& p) {
@@ -179,10 +216,9 @@ Fill generate(const Part& part, const MfsParams& params, const Shape& body, doub
   double lumen_mm = 0;
   for (const LumenSection& s : sections) lumen_mm = std::max(lumen_mm, 2 * s.inscribed_mm);
   if (lumen_mm < 2 * params.fibre_mm) {
-    return {everything(),
-            0,
-            {"part " + std::to_string(part.id()) + ": its lumen is " + mm(lumen_mm) +
-             " wide, narrower than two fibres (" + mm(2 * params.fibre_mm) + "): filled solid"}};
+    return {.shape = everything(),
+            .warnings = {"part " + std::to_string(part.id()) + ": its lumen is " + mm(lumen_mm) +
+                         " wide, narrower than two fibres (" + mm(2 * params.fibre_mm) + "): filled solid"}};
   }
 
   const FibreMap map = find_fibres(read_gray(params.micrograph ? *params.micrograph : bundled_micrograph()));
@@ -196,7 +232,9 @@ Fill generate(const Part& part, const MfsParams& params, const Shape& body, doub
   wanted.seed = mix(params.seed + static_cast<std::uint64_t>(part.id()));
   Fill fill;
   fill.shape = sweep(synthesize(map, wanted), part.axis(), extent.center());
-  fill.fibres = count_fibres(sections.front(), fill.shape, params.wall_mm, pixel_mm);
+  const SectionCount count = count_fibres(sections.front(), fill.shape, params.wall_mm, pixel_mm);
+  fill.fibres = count.fibres;
+  fill.free_edges = count.free_edges;
   return fill;
 }
 

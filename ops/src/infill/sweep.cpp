@@ -13,11 +13,13 @@ namespace {
 
 constexpr double max_turn_rad = 0.08;  // between stations; the error of the map is of fourth order in it
 
-std::vector<Vec3d> tangents(const std::vector<Vec3d>& p) {
+std::vector<Vec3d> tangents(const std::vector<Vec3d>& p, bool closed) {
   std::vector<Vec3d> t(p.size());
   for (std::size_t i = 0; i < p.size(); ++i)
     t[i] = normalized(p[std::min(i + 1, p.size() - 1)] - p[i == 0 ? 0 : i - 1]);
-  if (p.size() > 2) {
+  if (closed) {
+    t.front() = t.back() = normalized(p[1] - p[p.size() - 2]);
+  } else if (p.size() > 2) {
     // One-sided differences at the ends lag half a step behind: mirror the neighbour's tangent in the end's chord
     // instead.
     const auto mirrored = [](Vec3d neighbour, Vec3d chord) {
@@ -35,8 +37,8 @@ Vec3d reflected(Vec3d a, Vec3d mirror) {
   return length2 > 0 ? a - (2 * dot(mirror, a) / length2) * mirror : a;
 }
 
-std::vector<Frame> rotation_minimising(const std::vector<Vec3d>& p) {
-  const std::vector<Vec3d> t = tangents(p);
+std::vector<Frame> rotation_minimising(const std::vector<Vec3d>& p, bool closed) {
+  const std::vector<Vec3d> t = tangents(p, closed);
   std::vector<Frame> frames{frame_along(p[0], t[0])};
   for (std::size_t i = 0; i + 1 < p.size(); ++i) {
     const Vec3d step = p[i + 1] - p[i];
@@ -65,7 +67,10 @@ Sweep::Plane::Plane(const Frame& f)
       vz(static_cast<float>(f.y.z)) {}
 
 Sweep::Sweep(const Axis& axis) {
-  line_ = rotation_minimising(axis.centre_line());
+  const std::vector<Vec3d>& points = axis.centre_line();
+  closed_ = points.size() > 3 && norm(points.front() - points.back()) <= 1e-9 * axis.length_mm();
+  line_ = rotation_minimising(points, closed_);
+  if (closed_) close();
   arc_mm_.assign(1, 0);
   double turned = 0;
   stations_.push_back({line_[0]});
@@ -89,6 +94,22 @@ Sweep::Sweep(const Axis& axis) {
     planes_.emplace_back(stations_[k].frame);
     if (k > 0)
       longest_slab_mm_ = std::max(longest_slab_mm_, norm(stations_[k].frame.origin - stations_[k - 1].frame.origin));
+  }
+}
+
+/// A frame carried round a ring comes back turned: turned back evenly along the way, every membrane meets itself.
+void Sweep::close() {
+  const Frame &first = line_.front(), &last = line_.back();
+  const double turn = std::atan2(dot(last.x, first.y), dot(last.x, first.x));
+  double length = 0, way = 0;
+  for (std::size_t i = 1; i < line_.size(); ++i) length += norm(line_[i].origin - line_[i - 1].origin);
+  twist_per_mm_ = std::abs(turn) / length;
+  for (std::size_t i = 1; i < line_.size(); ++i) {
+    Frame& f = line_[i];
+    way += norm(f.origin - line_[i - 1].origin);
+    const double back = -turn * way / length;
+    const Vec3d x = std::cos(back) * f.x + std::sin(back) * f.y;
+    f = {f.origin, x, cross(f.z, x), f.z};
   }
 }
 
@@ -147,12 +168,13 @@ void Sweep::map(const PointBlock& block, float* u, float* v) const {
   const double radius = 0.5 * norm(box.size());
 
   // Slabs that may hold the nearest stretch of line for some point of the block.
+  const int lowest = closed_ ? 0 : -1, highest = closed_ ? last() - 1 : last();
   std::vector<double> distance;
-  for (int slab = -1; slab <= last(); ++slab) distance.push_back(distance_to_slab(slab, center));
+  for (int slab = lowest; slab <= highest; ++slab) distance.push_back(distance_to_slab(slab, center));
   const double reach = *std::min_element(distance.begin(), distance.end()) + 2 * radius + 0.1 * longest_slab_mm_;
   std::vector<int> candidates;
-  for (int slab = -1; slab <= last(); ++slab)
-    if (distance[static_cast<std::size_t>(slab + 1)] <= reach) candidates.push_back(slab);
+  for (int slab = lowest; slab <= highest; ++slab)
+    if (distance[static_cast<std::size_t>(slab - lowest)] <= reach) candidates.push_back(slab);
 
   if (candidates.back() - candidates.front() + 1 == static_cast<int>(candidates.size()) && candidates.size() <= 8) {
     map_in_run(candidates.front(), candidates.back(), block, center, radius, u, v);

@@ -21,9 +21,14 @@ class Sweep {
   void map(const PointBlock& block, float* u, float* v) const;
   /// The frame at a share of the line's length, 0 to 1; z along the limb.
   [[nodiscard]] Frame frame_at(double share) const;
+  /// How fast the frame turns about a ring's line so that it meets itself, rad / mm: the map of a place r mm off the
+  /// line is 1 + (r * twist)^2 / 2 Lipschitz at most. 0 along an open line.
+  [[nodiscard]] double twist_per_mm() const { return twist_per_mm_; }
 
  private:
-  /// Planes of stations k and k + 1 bound slab k; before the first and after the last plane the limb goes straight on.
+  void close();
+  /// Planes of stations k and k + 1 bound slab k; before the first and after the last plane the limb goes straight on,
+  /// unless it is a ring.
   struct Station {
     Frame frame;                    // z is the tangent
     double bend_u = 0, bend_v = 0;  // turn of the tangent towards u and v until the next station, rad
@@ -42,7 +47,8 @@ class Sweep {
 
   std::vector<Station> stations_;
   std::vector<Plane> planes_;  // one per station
-  double longest_slab_mm_ = 0;
+  double longest_slab_mm_ = 0, twist_per_mm_ = 0;
+  bool closed_ = false;
   std::vector<Frame> line_;  // at every point of the centre line
   std::vector<double> arc_mm_;
 };

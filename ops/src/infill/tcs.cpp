@@ -122,6 +122,35 @@ Shape crystal(const TcsParams& params) {
   return Shape(std::make_shared<const Crystal>(params));
 }
 
-Fill generate(const Part&, const TcsParams& params) { return {crystal(params), 0, {}}; }
+void each_stick(const TcsParams& params, const Box3d& box, const std::function<void(const Capsule&)>& visit) {
+  check(params);
+  const double quarter = 0.25 * params.cell_mm, stretch = params.stretch_z ? std::numbers::sqrt2 : 1;
+  const Vec3d unit{quarter, quarter, stretch * quarter};
+  const auto place = [&](int x, int y, int z) { return params.shift_mm + Vec3d{x * unit.x, y * unit.y, z * unit.z}; };
+  // Even coordinates from one stick before the box to one after it.
+  const auto first = [&](double low, double shift, double step) {
+    return 2 * static_cast<int>(std::floor(0.5 * ((low - shift) / step - 1)));
+  };
+  const auto last = [&](double high, double shift, double step) {
+    return static_cast<int>(std::ceil((high - shift) / step + 1));
+  };
+  constexpr std::array<std::array<int, 3>, 4> bonds{{{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}};
+  for (int x = first(box.min.x, params.shift_mm.x, unit.x); x <= last(box.max.x, params.shift_mm.x, unit.x); x += 2)
+    for (int y = first(box.min.y, params.shift_mm.y, unit.y); y <= last(box.max.y, params.shift_mm.y, unit.y); y += 2)
+      for (int z = first(box.min.z, params.shift_mm.z, unit.z); z <= last(box.max.z, params.shift_mm.z, unit.z);
+           z += 2) {
+        if (((x + y + z) / 2) % 2 != 0) continue;
+        for (const auto& b : bonds) visit({place(x, y, z), place(x + b[0], y + b[1], z + b[2]), 0.5 * params.stick_mm});
+      }
+}
+
+Fill generate(const Part&, const TcsParams& params) {
+  Fill fill{.shape = crystal(params)};
+  fill.sticks = [params](const Box3d& box, const std::function<void(const Capsule&)>& visit) {
+    each_stick(params, box, visit);
+  };
+  fill.ball_mm = params.ball_mm;
+  return fill;
+}
 
 }  // namespace fibrolite

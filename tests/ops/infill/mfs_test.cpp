@@ -78,6 +78,35 @@ TEST(Sweep, ADiscAlongAnArcIsATorus) {
   EXPECT_LT(worst, 0.01);
 }
 
+/// Round a ring the value depends on the place across it alone, and nowhere does a membrane break off: not at the seam
+/// of a flat ring, and not where the frame of a ring bent out of its plane comes back turned.
+TEST(Sweep, ARingHasNoSeam) {
+  const double radius = 20;
+  const int pieces = 90;
+  std::vector<Vec3d> flat, bent;
+  for (int i = 0; i <= pieces; ++i) {
+    const double a = 2 * pi * (i % pieces) / pieces;
+    flat.push_back({radius * std::cos(a), radius * std::sin(a), 0});
+    bent.push_back({radius * std::cos(a), radius * std::sin(a), 6 * std::sin(2 * a) + 3 * std::cos(a)});
+  }
+  const Shape ring = sweep(muscle(), Axis::along(flat));
+  for (double r = 15; r < 25; r += 0.7)
+    for (double z = -5; z <= 5; z += 0.9) {
+      const float first = ring({-r, 0, z});
+      for (double a = -0.3; a < 0.3; a += 0.05)
+        EXPECT_NEAR(ring({r * std::cos(a), r * std::sin(a), z}), first, 0.06) << r << ' ' << z << ' ' << a;
+    }
+  const Shape knot = sweep(muscle(), Axis::along(bent));
+  const double step = 0.02, lipschitz = knot.lipschitz();
+  for (double r = 17; r < 23; r += 1.1)
+    for (double a = -0.2; a < 0.2; a += step / r) {
+      const auto at = [&](double angle) {
+        return knot({r * std::cos(angle), r * std::sin(angle), 6 * std::sin(2 * angle) + 3 * std::cos(angle)});
+      };
+      EXPECT_LT(std::abs(at(a) - at(a + step / r)), 2 * lipschitz * step) << r << ' ' << a;
+    }
+}
+
 TEST(Sweep, CenterMovesTheImage) {
   const Axis axis = Axis::straight({0, 0, 0}, {0, 0, 10});
   const Shape moved = sweep(disc_image(2, 8), axis, {1.5, -0.5});

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "fibrolite/context.h"
+#include "fibrolite/frame.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/solid.h"
 
@@ -12,8 +13,9 @@ namespace fibrolite {
 
 /// A coarse, clean picture of the model on which everything that must not depend on the fine voxel is decided.
 struct Proxy {
-  Solid solid;   ///< Level set at the proxy voxel, band 3 voxels outside, whole interior signed.
-  Mesh surface;  ///< Its surface: closed, outward, about `triangles` faces.
+  Solid solid;    ///< Level set at the proxy voxel, band 3 voxels outside, whole interior signed.
+  Mesh surface;   ///< Its surface: closed, outward, about `triangles` faces.
+  Frame frame{};  ///< Whose coordinates both are given in.
 };
 struct ProxyParams {
   int triangles = 40000;  ///< Aimed at; up to four times as many where thin limbs would be lost; 1000 to 200000.

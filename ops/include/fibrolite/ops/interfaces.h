@@ -2,6 +2,7 @@
 // Where two parts meet.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "fibrolite/context.h"
@@ -21,6 +22,11 @@ struct Interface {
 /// for a disc wider than 3000 pixels). Sections below 16 pixels or 3 % of the cut's largest are left out.
 [[nodiscard]] std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const Shape& body,
                                                  double pixel_mm);
+
+/// What an interface has to carry, N: the integral over its section of `traction` (MPa at a point, on the plane with a
+/// normal), sampled at about a thousand points of it.
+[[nodiscard]] double demand_n(const Interface& section, const Labels& labels, const Shape& body,
+                              const std::function<double(Vec3d point_mm, Vec3d normal)>& traction_mpa);
 
 /// `body` must not depend on the voxel (distance to the mesh). Sampled at `pixel_mm`. Sorted by (a, b, centroid).
 [[nodiscard]] std::vector<Interface> interfaces(const Parts& parts, const Shape& body, double pixel_mm,

@@ -56,6 +56,8 @@ class Labels {
   /// The same points, candidates renamed by `part_of_candidate` (several may get one name; borders between them
   /// vanish).
   [[nodiscard]] Labels merged(const std::vector<int>& part_of_candidate) const;
+  /// These are labels of a frame's coordinates: the same in the world's.
+  [[nodiscard]] Labels placed(const Frame& frame) const;
 
  private:
   std::shared_ptr<const Impl> impl_;

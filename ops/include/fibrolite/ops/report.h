@@ -29,6 +29,7 @@ struct InterfaceReport {
   double area_mm2 = 0;
   int regions_before = 0, regions_after = 0, columns = 0, columns_dropped = 0;
   double layer_area_mm2 = 0, union_area_mm2 = 0, bridge_area_mm2 = 0, contact_area_mm2 = 0;
+  double capacity_over_demand = 0;  ///< contact_area * yield / integral of the traction in the worst load case.
 };
 struct SolidReport {
   double volume_mm3 = 0, fill_ratio = 0, mass_g = 0;
@@ -37,7 +38,10 @@ struct SolidReport {
   std::int64_t ties = 0;            ///< Struts added to loose pieces.
   std::int64_t specks_removed = 0;  ///< Loose pieces of a few voxels.
   std::int64_t voids_filled = 0;    ///< Micro-voids.
-  std::int64_t dangling = 0, unreached = 0, active_voxels = 0;
+  std::int64_t dangling = 0;  ///< Sticks that end in the void; membranes that do, in the middle section of a column.
+  std::int64_t unreached =
+      0;  ///< Material that hangs on the shell only through necks thinner than the thinnest member.
+  std::int64_t active_voxels = 0;
   double voxel_mm = 0;
 };
 struct StageReport {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,7 +24,7 @@ struct VerifyParams {
   double azimuth_deg = 0;
   /// The lowest share of the height is fixed; the load avoids it too. 0 to 0.5, exclusive.
   double support_share = 0.05;
-  bool world_axes = false;  ///< The paper's x, y, z instead of the part's own axis field.
+  bool world_axes = false;  ///< x, y, z, as in the paper, instead of the part's own axis field; see stance().
   Vec3d up{0, 0, 1};        ///< Any length above zero.
   /// Surface triangles of the whole body's mesh at most; a component gets its share by area, a quarter to two thirds of
   /// it. Means change by a few per cent from 3000 to 6000. 500 to 50000.
@@ -38,6 +39,9 @@ struct Verification {
   double residual = 0;             ///< Relative, worst solve.
   double equilibrium = 0;          ///< |sum of reactions + sum of loads| / load, worst solve.
   std::vector<std::string> notes;
+  /// Length of the traction, MPa, on the plane through a point of the body with a unit normal, in the load case where
+  /// it is largest; from the solve of the whole body, taken as solid. Thread-safe.
+  std::function<double(Vec3d point_mm, Vec3d normal)> traction_mpa;
 };
 /// Two solves of the whole body (load from above; the same at 45 degrees, at the same place), then each candidate on
 /// its own mesh with the coarse displacements on its cut faces, its own share of the load and of the support. A

@@ -2,6 +2,8 @@
 // Tetrahedral crystal structure (paper Sec. 5.2).
 #pragma once
 
+#include <functional>
+
 #include "fibrolite/ops/fill.h"
 #include "fibrolite/ops/part.h"
 
@@ -20,5 +22,7 @@ struct TcsParams {
 [[nodiscard]] Fill generate(const Part& part, const TcsParams& params);
 /// The distance alone, for tests and benchmarks.
 [[nodiscard]] Shape crystal(const TcsParams& params);
+/// Each stick that may reach into the box, once, from node to node; others near the box too. Cost: O(cells in the box).
+void each_stick(const TcsParams& params, const Box3d& box, const std::function<void(const Capsule&)>& visit);
 
 }  // namespace fibrolite

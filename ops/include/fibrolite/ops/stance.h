@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How the model stands under its load. Parts are decided in that frame, so that they do not depend on how model and
+// load lie in the file.
+#pragma once
+
+#include "fibrolite/frame.h"
+#include "fibrolite/mesh.h"
+#include "fibrolite/ops/part.h"
+#include "fibrolite/ops/partition.h"
+#include "fibrolite/ops/verify.h"
+
+namespace fibrolite {
+
+/// z is `params.up`, x points level to where the slanted load comes from; the origin stays. World axes exactly where
+/// they are that up to rounding: a quarter turn then changes no bit of what is decided.
+/// @throws Error BadRecipe: up has no direction.
+[[nodiscard]] Frame stance(const VerifyParams& params);
+/// The same load as `params`, seen in its stance: up is z, azimuth 0.
+[[nodiscard]] VerifyParams in_stance(const VerifyParams& params);
+
+/// A mesh in a frame's coordinates. Cost: O(vertices).
+[[nodiscard]] Mesh seen_from(const Frame& frame, Mesh mesh);
+
+// From a frame's coordinates back to the world's. Cost: O(parts), one more turn of each point asked for.
+[[nodiscard]] Axis placed(const Axis& axis, const Frame& frame);
+[[nodiscard]] Cut placed(Cut cut, const Frame& frame);
+[[nodiscard]] Partition placed(Partition partition, const Frame& frame);
+[[nodiscard]] Parts placed(const Parts& parts, const Frame& frame);
+
+}  // namespace fibrolite

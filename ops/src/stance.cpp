@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/stance.h"
+
+#include <cmath>
+#include <utility>
+
+#include "fibrolite/error.h"
+#include "load.h"
+#include "part_maker.h"
+
+namespace fibrolite {
+namespace {
+
+/// Unit vectors a rounding away from a world axis are that axis.
+Vec3d tidy(Vec3d v) {
+  const auto rounded = [](double x) { return std::abs(x - std::round(x)) < 1e-12 ? std::round(x) : x; };
+  return {rounded(v.x), rounded(v.y), rounded(v.z)};
+}
+
+Vec3d turned(const Frame& frame, Vec3d direction) {
+  return direction.x * frame.x + direction.y * frame.y + direction.z * frame.z;
+}
+
+template <class Map>
+Box3d mapped(const Box3d& box, Map&& map) {
+  Box3d result;
+  for (unsigned corner = 0; corner < 8; ++corner)
+    result.include(map(Vec3d{(corner & 1U) != 0 ? box.max.x : box.min.x, (corner & 2U) != 0 ? box.max.y : box.min.y,
+                             (corner & 4U) != 0 ? box.max.z : box.min.z}));
+  return result;
+}
+
+}  // namespace
+
+Frame stance(const VerifyParams& params) {
+  if (!(norm(params.up) > 0) || !std::isfinite(norm(params.up)) || !std::isfinite(params.azimuth_deg))
+    throw Error(Code::BadRecipe, "up must be a direction and azimuth_deg a number", "verify");
+  const Vec3d up = tidy(normalized(params.up)), from = tidy(slanted_from(up, params.azimuth_deg));
+  return {{}, from, cross(up, from), up};
+}
+
+VerifyParams in_stance(const VerifyParams& params) {
+  const Frame frame = stance(params);
+  VerifyParams standing = params;
+  standing.up = {0, 0, 1};
+  standing.azimuth_deg = 0;
+  if (params.load_box_mm)
+    standing.load_box_mm = mapped(*params.load_box_mm, [&](Vec3d p) { return frame.to_local(p); });
+  return standing;
+}
+
+Mesh seen_from(const Frame& frame, Mesh mesh) {
+  for (Vec3f& v : mesh.vertices) v = to_float(frame.to_local(to_double(v)));
+  return mesh;
+}
+
+Axis placed(const Axis& axis, const Frame& frame) {
+  std::vector<Vec3d> points = axis.centre_line();
+  for (Vec3d& p : points) p = frame.to_world(p);
+  return Axis::along(std::move(points));
+}
+
+Cut placed(Cut cut, const Frame& frame) {
+  cut.frame = {frame.to_world(cut.frame.origin), turned(frame, cut.frame.x), turned(frame, cut.frame.y),
+               turned(frame, cut.frame.z)};
+  return cut;
+}
+
+Partition placed(Partition partition, const Frame& frame) {
+  for (Candidate& candidate : partition.candidates) {
+    candidate.centroid_mm = frame.to_world(candidate.centroid_mm);
+    candidate.axis = placed(candidate.axis, frame);
+  }
+  for (Cut& cut : partition.cuts) cut = placed(cut, frame);
+  partition.labels = partition.labels.placed(frame);
+  return partition;
+}
+
+Parts placed(const Parts& parts, const Frame& frame) {
+  Parts result;
+  result.labels = parts.labels.placed(frame);
+  for (const Cut& cut : parts.cuts) result.cuts.push_back(placed(cut, frame));
+  for (const Part& part : parts.parts)
+    result.parts.push_back(
+        PartMaker::make({.id = part.id(),
+                         .kind = part.kind(),
+                         .region = result.labels.region(part.id()),
+                         .bounds_mm = mapped(part.bounds_mm(), [&](Vec3d p) { return frame.to_world(p); }),
+                         .axis = placed(part.axis(), frame),
+                         .diameter_mm = part.diameter_mm(),
+                         .volume_mm3 = part.volume_mm3(),
+                         .centroid_mm = frame.to_world(part.centroid_mm()),
+                         .stress = part.stress(),
+                         .reason = part.reason()}));
+  return result;
+}
+
+}  // namespace fibrolite

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/dangling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <tuple>
+
+#include "fibrolite/ops/infill/tcs.h"
+#include "fibrolite/realize.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr TcsParams params{.cell_mm = 6, .stick_mm = 0.8, .ball_mm = 1.6};
+constexpr Box3d box{{-9, -9, -9}, {9, 9, 9}};
+constexpr double shell_mm = 1;
+
+Fill crystal_fill() {
+  Fill fill{.shape = crystal(params)};
+  fill.sticks = [](const Box3d& where, const std::function<void(const Capsule&)>& visit) {
+    each_stick(params, where, visit);
+  };
+  fill.ball_mm = params.ball_mm;
+  return fill;
+}
+
+/// A cube with a shell; crystal below the plane, nothing above it, and between them a layer or none.
+std::int64_t count(double plane_mm, bool layer) {
+  const Shape body = cuboid(box), low = half_space({0, 0, plane_mm}, {0, 0, 1});
+  std::vector<Shape> material{subtract(body, offset(body, -shell_mm)), intersect({crystal(params), low})};
+  if (layer) material.push_back(cuboid({{-9, -9, plane_mm - 0.4}, {9, 9, plane_mm + 0.8}}));
+  const Solid solid = realize(intersect({body, unite(material)}), box.grown(1), {.voxel_mm = 0.2});
+  return dangling_sticks(crystal_fill(), box, low, body, shell_mm, solid);
+}
+
+TEST(Sticks, each_once_four_to_a_node) {
+  std::set<std::tuple<long, long, long, long, long, long>> seen;
+  double nearest = 1e9;
+  const Shape lattice = crystal(params);
+  each_stick(params, {{0, 0, 0}, {12, 12, 12}}, [&](const Capsule& s) {
+    const auto key = [](double v) { return std::lround(v * 1000); };
+    EXPECT_TRUE(seen.insert({key(s.a.x), key(s.a.y), key(s.a.z), key(s.b.x), key(s.b.y), key(s.b.z)}).second);
+    EXPECT_NEAR(norm(s.b - s.a), std::sqrt(3.0) / 4 * 6, 1e-9);
+    for (const double t : {0.4, 0.5, 0.6}) EXPECT_NEAR(lattice(s.a + t * (s.b - s.a)), -0.4, 1e-4);
+    nearest = std::min(nearest, norm(0.5 * (s.a + s.b) - Vec3d{6, 6, 6}));
+  });
+  EXPECT_GE(seen.size(), 8U * 16U);  // sixteen to a cell
+  EXPECT_LT(nearest, 1.5);
+}
+
+TEST(Dangling, none_where_every_stick_ends_in_the_shell) {
+  const Solid solid =
+      realize(intersect({cuboid(box), unite({subtract(cuboid(box), offset(cuboid(box), -shell_mm)), crystal(params)})}),
+              box.grown(1), {.voxel_mm = 0.2});
+  EXPECT_EQ(dangling_sticks(crystal_fill(), box, everything(), cuboid(box), shell_mm, solid), 0);
+}
+
+/// A plane half way up the sticks leaves one free end for each stick it cuts inside the shell; a layer there takes
+/// them all. Between two levels of nodes of the cubic lattice, 1.5 mm apart, every stick crosses.
+TEST(Dangling, counts_the_sticks_that_a_plane_leaves_hanging) {
+  const double plane = 0.75;
+  std::int64_t cut = 0;
+  each_stick(params, box, [&](const Capsule& s) {
+    const double t = (plane - s.a.z) / (s.b.z - s.a.z);
+    const Vec3d at = s.a + t * (s.b - s.a);
+    cut += t > 0 && t < 1 && std::abs(at.x) < 8 && std::abs(at.y) < 8 ? 1 : 0;
+  });
+  ASSERT_GT(cut, 20);
+  const std::int64_t found = count(plane, false);
+  EXPECT_LE(found, cut);
+  EXPECT_GE(found, cut - 2 * 11);  // those that also touch the shell hang on that: at most along its four sides
+  EXPECT_EQ(count(plane, true), 0);
+}
+
+/// A plane just above a level of nodes: each node there keeps its two sticks from below, and stubs within the balls.
+TEST(Dangling, a_node_at_the_border_holds_by_its_other_sticks) { EXPECT_EQ(count(0.1, false), 0); }
+
+TEST(Dangling, a_node_on_one_stick_is_an_end) {
+  // One stick alone, from the floor's shell up into the void.
+  Fill fill{.shape = capsule({0, 0, -9}, {0, 0, 0}, 0.4)};
+  fill.ball_mm = 0.8;
+  fill.sticks = [](const Box3d&, const std::function<void(const Capsule&)>& visit) {
+    visit({{0, 0, -9}, {0, 0, 0}, 0.4});
+    visit({{4, 0, -9}, {4, 0, 0}, 0.4});  // this one was not realized: it is no material
+  };
+  const Shape body = cuboid(box);
+  const auto solid = [&](const Shape& more) {
+    return realize(intersect({body, unite({subtract(body, offset(body, -shell_mm)), fill.shape, more})}), box.grown(1),
+                   {.voxel_mm = 0.2});
+  };
+  EXPECT_EQ(dangling_sticks(fill, box, everything(), body, shell_mm, solid(nothing())), 1);
+  const Shape beam = capsule({-9, 0, 0.5}, {9, 0, 0.5}, 0.4);  // carries its head
+  Fill one = fill;
+  one.sticks = [](const Box3d&, const std::function<void(const Capsule&)>& visit) {
+    visit({{0, 0, -9}, {0, 0, 0}, 0.4});
+  };
+  EXPECT_EQ(dangling_sticks(one, box, everything(), body, shell_mm, solid(beam)), 0);
+}
+
+}  // namespace
+}  // namespace fibrolite
