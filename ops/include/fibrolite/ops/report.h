@@ -57,6 +57,11 @@ struct ModelReport {
   double volume_mm3 = 0;
   std::vector<std::string> repairs;
 };
+/// Sizes and checks of the finite element solves; zero where there was none.
+struct VerificationReport {
+  std::int64_t tets = 0, dof = 0;        ///< Of all solves together.
+  double residual = 0, equilibrium = 0;  ///< Relative, of the worst solve.
+};
 struct Report {
   std::string command;
   Recipe recipe;
@@ -64,6 +69,7 @@ struct Report {
   int threads = 0;  ///< 0: not known.
   ModelReport model;
   double threshold = 0, stable_from = 0, stable_to = 0;
+  VerificationReport verification;
   std::vector<PartReport> parts;
   std::vector<InterfaceReport> interfaces;
   SolidReport solid;
