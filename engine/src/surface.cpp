@@ -15,8 +15,19 @@
 #include "fibrolite/random.h"
 #include "vdb_access.h"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 namespace fibrolite {
 namespace {
+
+/// Trees that are gone leave their memory with the allocator, in blocks too small for what comes now.
+void return_free_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
 
 using Points = std::vector<openvdb::Vec3s>;
 using Quads = std::vector<openvdb::Vec4I>;
@@ -70,10 +81,10 @@ void inflate(Points& points, const Quads& quads, double voxel, double wanted_mm3
   constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
   const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
   struct Umbrella {
-    float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours
+    float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours; later the move
     float nx = 0, ny = 0, nz = 0;  // sum of quad normals
-    float length = 0;              // of those normals, summed: longer than the sum where the surface bends
-    std::int32_t edges = 0;
+    float flatness = 0;  // their lengths, summed: longer than the sum where the surface bends; later the ratio
+    float edges = 0;     // neighbours, counted once per quad; later the flattest vertex around
   };
   std::vector<Umbrella> umbrellas(points.size());
   for (const auto& q : quads) {
@@ -88,33 +99,35 @@ void inflate(Points& points, const Quads& quads, double voxel, double wanted_mm3
       u.nx += n.x();
       u.ny += n.y();
       u.nz += n.z();
-      u.length += length;
+      u.flatness += length;
       u.edges += 2;
     }
   }
-  std::vector<float> flatness(points.size()), flattest(points.size(), 0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Umbrella& u = umbrellas[i];
-    flatness[i] = u.length > 0 ? std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz) / u.length : 0;
-  }
-  for (const auto& q : quads) {
-    const float most = std::max(std::max(flatness[q[0]], flatness[q[1]]), std::max(flatness[q[2]], flatness[q[3]]));
-    for (int k = 0; k < 4; ++k) flattest[q[k]] = std::max(flattest[q[k]], most);
-  }
-  const double most = 0.35 * voxel;
-  std::vector<openvdb::Vec3s> moves(points.size());
   const auto each_point = [&](const auto& work) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
       for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
     });
   };
   each_point([&](std::size_t i) {
-    const Umbrella& u = umbrellas[i];
+    Umbrella& u = umbrellas[i];
+    const float n = std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz), mean = 1 / std::max(u.edges, 1.0F);
+    u.x *= mean, u.y *= mean, u.z *= mean;
+    u.flatness = u.flatness > 0 ? n / u.flatness : 0;
+    u.edges = 0;
+  });
+  for (const auto& q : quads) {
+    float most = 0;
+    for (int k = 0; k < 4; ++k) most = std::max(most, umbrellas[q[k]].flatness);
+    for (int k = 0; k < 4; ++k) umbrellas[q[k]].edges = std::max(umbrellas[q[k]].edges, most);
+  }
+  const double most = 0.35 * voxel;
+  each_point([&](std::size_t i) {
+    Umbrella& u = umbrellas[i];
     const Vec3d n = normalized(Vec3d{u.nx, u.ny, u.nz});
-    const double along = dot(Vec3d{u.x, u.y, u.z}, n) / std::max(u.edges, 1);
-    const float edge = (1 - ramp(flatness[i], sharp, smooth)) * ramp(flattest[i], bent, flat);
-    const Vec3d move = std::clamp((edge - 1) * along, -most, most) * n;
-    moves[i] = openvdb::Vec3s(static_cast<float>(move.x), static_cast<float>(move.y), static_cast<float>(move.z));
+    const double along = dot(Vec3d{u.x, u.y, u.z}, n);
+    const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.edges, bent, flat);
+    const Vec3f move = to_float(std::clamp((edge - 1) * along, -most, most) * n);
+    u.x = move.x, u.y = move.y, u.z = move.z;
   });
   // Two steps or so: a quad's shorter diagonal may turn on the way. A field that is no distance may hold a volume that
   // no such move can reach.
@@ -124,7 +137,8 @@ void inflate(Points& points, const Quads& quads, double voxel, double wanted_mm3
   for (int round = 0; round < rounds && step != 0; ++round) {
     const double to = std::clamp(moved + step, 0.0, 2.0);
     const auto more = static_cast<float>(to - moved);
-    each_point([&](std::size_t i) { points[i] += more * moves[i]; });
+    each_point(
+        [&](std::size_t i) { points[i] += more * openvdb::Vec3s(umbrellas[i].x, umbrellas[i].y, umbrellas[i].z); });
     const double after = volume(points, quads), gained = after - now;
     const bool done = gained == 0 || std::abs(after - wanted_mm3) <= close_enough * wanted_mm3;
     step = done ? 0 : (wanted_mm3 - after) * (to - moved) / gained;
@@ -163,7 +177,9 @@ Mesh surface(const Solid& solid, const SurfaceParams& params, const Context& con
   Points points;
   Quads quads;
   std::vector<openvdb::Vec3I> triangles;  // stays empty at adaptivity 0
+  return_free_memory();
   openvdb::tools::volumeToMesh(*solid.impl().grid, points, triangles, quads, 0.0, 0.0);
+  return_free_memory();
   context.check();
   context.progress(0.6);
   if (points.size() >= std::numeric_limits<std::uint32_t>::max()) {
