@@ -58,6 +58,7 @@ int run(int argc, char** argv) {
   program.require_subcommand(1);
   add_generate_command(program);
   add_partition_command(program);
+  add_verify_command(program);
   add_check_command(program);
   add_recipe_command(program);
   check_command_name(program, argc, argv);

@@ -60,10 +60,6 @@ InterfaceReport interface_report(const Cut& cut) {
 
 void fill_report(Report& report, const Model& model, const Partition& parts) {
   report.model.volume_mm3 = signed_volume(model.mesh);
-  report.warnings.insert(report.warnings.end(), parts.notes.begin(), parts.notes.end());
-  report.threshold = parts.threshold;
-  report.stable_from = parts.stable_from;
-  report.stable_to = parts.stable_to;
   for (const Candidate& candidate : parts.candidates) report.parts.push_back(part_report(candidate));
   for (const Cut& cut : parts.cuts) report.interfaces.push_back(interface_report(cut));
 }
@@ -90,7 +86,8 @@ std::vector<NamedSolid> grids(const Solid& body, const Partition& parts, const C
 }
 
 void run_partition(const PartitionOptions& options) {
-  const Recipe recipe = options.recipe.load();
+  Recipe recipe = options.recipe.load();
+  recipe.verify.up = direction(options.model.up);
   std::vector<fs::path> targets = options.output.files;
   targets.push_back(options.output.report_path());
 
@@ -107,22 +104,12 @@ void run_partition(const PartitionOptions& options) {
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
   if (options.voxel_mm) check_memory(model.mesh, *options.voxel_mm, recipe, InfillKind::Solid, options.run);
-  // As generate does: parts are found as the model stands under its load.
-  const Frame stand = stance(recipe.verify);
-  const Proxy proxy = stage("proxy", [&] {
-    Proxy made = make_proxy(seen_from(stand, model.mesh), {}, context.part(0.1, 0.2, "proxy"));
-    made.frame = stand;
-    return made;
-  });
-  const DiameterField field =
-      stage("diameter", [&] { return diameter(proxy.surface, {}, context.part(0.2, 0.5, "diameter")); });
-  const Partition parts = stage("partition", [&] {
-    return placed(partition(proxy, field, recipe.partition, context.part(0.5, 0.8, "partition")), stand);
-  });
+  const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.8, ""));
+  const Partition parts = placed(found.partition, found.proxy.frame);
   fill_report(report, model, parts);
 
   // The parts are functions of space: they can be shown on a body as fine as is asked for.
-  const double voxel = options.voxel_mm.value_or(proxy.solid.grid().voxel_mm);
+  const double voxel = options.voxel_mm.value_or(found.proxy.solid.grid().voxel_mm);
   const Solid body = stage("body", [&] {
     return to_solid(model.mesh, {.grid = {.voxel_mm = voxel}}, context.part(0.8, 0.85, "body")).solid;
   });

@@ -9,6 +9,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/file.h"
 #include "fibrolite/mesh_io.h"
+#include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
@@ -62,6 +63,24 @@ void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, Infi
   throw Error(Code::TooLarge, what, where,
               fitting < coarsest ? "use --voxel " + number_text(fitting) + " or larger, or raise --max-memory"
                                  : "raise --max-memory");
+}
+
+FoundParts find_parts(const Model& model, const Recipe& recipe, Report& report, const Context& context) {
+  Stopwatch stage(report.stages);
+  FoundParts found;
+  const Frame stand = stance(recipe.verify);
+  found.proxy =
+      stage("proxy", [&] { return make_proxy(seen_from(stand, model.mesh), {}, context.part(0, 0.1, "proxy")); });
+  found.proxy.frame = stand;
+  const DiameterField field =
+      stage("diameter", [&] { return diameter(found.proxy.surface, {}, context.part(0.1, 0.6, "diameter")); });
+  found.partition = stage(
+      "partition", [&] { return partition(found.proxy, field, recipe.partition, context.part(0.6, 1, "partition")); });
+  report.warnings.insert(report.warnings.end(), found.partition.notes.begin(), found.partition.notes.end());
+  report.threshold = found.partition.threshold;
+  report.stable_from = found.partition.stable_from;
+  report.stable_to = found.partition.stable_to;
+  return found;
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text) {

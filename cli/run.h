@@ -10,6 +10,7 @@
 
 #include "fibrolite/context.h"
 #include "fibrolite/ops/hybridize.h"
+#include "fibrolite/ops/partition.h"
 #include "fibrolite/ops/prepare.h"
 #include "fibrolite/ops/report.h"
 #include "options.h"
@@ -21,6 +22,14 @@ namespace fibrolite::cli {
 
 /// @throws Error TooLarge, before anything is allocated, if the run would need more than it may use.
 void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run);
+
+/// What decides by shape: proxy, diameter and partition as stages of the report, seen as the model stands under its
+/// load (proxy.frame); to be placed in the world.
+struct FoundParts {
+  Proxy proxy;
+  Partition partition;
+};
+[[nodiscard]] FoundParts find_parts(const Model& model, const Recipe& recipe, Report& report, const Context& context);
 
 /// Whole or absent. @throws Error Io.
 void write_text(const std::filesystem::path& path, const std::string& text);

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <set>
 
-#include "cli/run_program.h"
+#include "run_program.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/prepare.h"
 #include "fibrolite/ops/text.h"

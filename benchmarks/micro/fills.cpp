@@ -23,9 +23,10 @@ struct Leaf {
   Leaf() {
     for (int n = 0; n < PointBlock::capacity; ++n) {
       const auto i = static_cast<std::size_t>(n);
-      x[i] = static_cast<float>(voxel_mm * (origin.x + n / 64));
-      y[i] = static_cast<float>(voxel_mm * (origin.y + n / 8 % 8));
-      z[i] = static_cast<float>(voxel_mm * (origin.z + n % 8));
+      const Vec3i at{origin.x + n / 64, origin.y + n / 8 % 8, origin.z + n % 8};
+      x[i] = static_cast<float>(voxel_mm * at.x);
+      y[i] = static_cast<float>(voxel_mm * at.y);
+      z[i] = static_cast<float>(voxel_mm * at.z);
     }
   }
   [[nodiscard]] PointBlock block() const {

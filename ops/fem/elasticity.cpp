@@ -385,11 +385,6 @@ Solution finish(const TetMesh& mesh, const Incidence& incidence, const Material&
 
 }  // namespace
 
-double von_mises(const Stress& s) {
-  const double a = s[0] - s[1], b = s[1] - s[2], c = s[2] - s[0];
-  return std::sqrt(0.5 * (a * a + b * b + c * c) + 3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
-}
-
 double normal_stress(const Stress& s, Vec3d n) {
   return s[0] * n.x * n.x + s[1] * n.y * n.y + s[2] * n.z * n.z +
          2 * (s[3] * n.x * n.y + s[4] * n.y * n.z + s[5] * n.z * n.x);

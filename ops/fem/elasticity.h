@@ -8,14 +8,12 @@
 
 #include "fibrolite/context.h"
 #include "fibrolite/ops/material.h"
+#include "fibrolite/stress.h"
 #include "fibrolite/tet_mesh.h"
 
 namespace fibrolite::fem {
 
-/// xx yy zz xy yz zx, MPa; tension is positive.
-using Stress = std::array<double, 6>;
-/// Von Mises equivalent stress, MPa.
-[[nodiscard]] double von_mises(const Stress& stress);
+using Stress = StressTensor;
 /// Normal stress on the plane with unit normal `n`, MPa.
 [[nodiscard]] double normal_stress(const Stress& stress, Vec3d n);
 

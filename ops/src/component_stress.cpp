@@ -51,7 +51,7 @@ MeanStress mean_in_axis(const TetMesh& mesh, const std::vector<fem::Stress>& str
     const Frame f = turned_to(mean_frame, axis.tangent(tet.centroid));
     mean.volume_mm3 += tet.volume;
     mean.axial += tet.volume * std::abs(fem::normal_stress(stress[t], f.z));
-    mean.von_mises += tet.volume * fem::von_mises(stress[t]);
+    mean.von_mises += tet.volume * von_mises(stress[t]);
     // The normal stress in direction x cos + y sin, from the three components in the plane.
     const double xx = fem::normal_stress(stress[t], f.x), yy = fem::normal_stress(stress[t], f.y);
     const double xy = fem::normal_stress(stress[t], std::numbers::sqrt2 / 2 * (f.x + f.y)) - 0.5 * (xx + yy);
@@ -77,7 +77,7 @@ MeanStress mean_in_world(const TetMesh& mesh, const std::vector<fem::Stress>& st
   for (const std::uint32_t t : tets) {
     const double volume = measure(mesh, t).volume;
     mean.volume_mm3 += volume;
-    mean.von_mises += volume * fem::von_mises(stress[t]);
+    mean.von_mises += volume * von_mises(stress[t]);
     for (std::size_t k = 0; k < 3; ++k) along[k] += volume * std::abs(stress[t][k]);
   }
   if (!(mean.volume_mm3 > 0)) return {};

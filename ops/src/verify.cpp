@@ -41,7 +41,8 @@ void check_params(const VerifyParams& p) {
 /// What both levels share: the load, the support, the material.
 struct Setting {
   Vec3d up;
-  std::vector<Vec3d> forces_n;  // one per load case
+  std::vector<Vec3d> forces_n;          // one per load case
+  std::vector<std::string> case_names;  // one per load case
   Material material;
   double voxel_mm;
   Support support;
@@ -50,6 +51,8 @@ struct Setting {
 
 struct Model {
   TetMesh mesh;
+  std::vector<fem::Fixed> fixed;
+  std::vector<fem::LoadCase> cases;
   std::vector<fem::Solution> solutions;  // one per load case
 };
 
@@ -100,9 +103,9 @@ Model solve_body(TetMesh mesh, const VerifyParams& params, Setting& setting, con
     if (dot(mesh.nodes[node], setting.up) > setting.support.limit_mm) continue;
     for (int axis = 0; axis < 3; ++axis) fixed.push_back({node, axis});
   }
-  const auto cases = load_cases(mesh, setting, [](Vec3d) { return true; });
+  auto cases = load_cases(mesh, setting, [](Vec3d) { return true; });
   auto solutions = fem::solve(mesh, setting.material, fixed, cases, context);
-  return {std::move(mesh), std::move(solutions)};
+  return {std::move(mesh), std::move(fixed), std::move(cases), std::move(solutions)};
 }
 
 /// Stage 2: a candidate on its own mesh. On its cut faces it follows the body's coarse displacements.
@@ -132,7 +135,7 @@ Model solve_component(TetMesh mesh, const Model& body, const fem::Locator& locat
     }
   }
   auto solutions = fem::solve(mesh, setting.material, fixed, cases, context);
-  return {std::move(mesh), std::move(solutions)};
+  return {std::move(mesh), std::move(fixed), std::move(cases), std::move(solutions)};
 }
 
 std::vector<std::uint32_t> all_tets(const TetMesh& mesh) {
@@ -283,6 +286,21 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
   }
 }
 
+/// What was solved for the whole body, with everything that a reader of files wants to know.
+StressField stress_field(const Model& body, const Setting& setting, const Labels& labels) {
+  StressField field{body.mesh, {}, setting.material, {}, {}, {}};
+  for (const auto& n : body.mesh.tets)
+    field.part.push_back(labels.label(
+        0.25 * (body.mesh.nodes[n[0]] + body.mesh.nodes[n[1]] + body.mesh.nodes[n[2]] + body.mesh.nodes[n[3]])));
+  for (const fem::Fixed& f : body.fixed) field.fixed.push_back({f.node, f.axis});
+  for (std::size_t c = 0; c < body.cases.size(); ++c) {
+    const std::vector<Vec3d>& displacement = body.solutions[c].displacement_mm;
+    field.cases.push_back({setting.case_names[c], body.cases[c].force_n, displacement,
+                           fem::nodal_stress(body.mesh, setting.material, displacement)});
+  }
+  return field;
+}
+
 void account(Verification& result, const Model& model, double load_n) {
   result.tets += static_cast<std::int64_t>(model.mesh.tets.size());
   result.dof += 3 * static_cast<std::int64_t>(model.mesh.nodes.size());
@@ -333,7 +351,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   check_params(given);
   VerifyParams params = given;
   params.up = normalized(given.up);
-  Setting setting{params.up, {}, material, proxy.solid.grid().voxel_mm, {}, {}};
+  Setting setting{params.up, {}, {"from above", "slanted"}, material, proxy.solid.grid().voxel_mm, {}, {}};
   for (const Vec3d& direction : load_directions(params.up, params.azimuth_deg)) {
     setting.forces_n.push_back(params.load_n * direction);
   }
@@ -399,6 +417,10 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     throw Error(Code::SolverFailed, "the supports do not answer the load", "verify", "report this model");
   }
   make_parts(result, proxy, partition, verdicts);
+  if (params.keep_field) {
+    result.field = stress_field(body, setting, result.parts.labels);
+    result.field.frame = proxy.frame;
+  }
   context.progress(1);
   return result;
 }

@@ -257,6 +257,25 @@ TEST(Partition, PartsInColourAsGridsAndInTheReport) {
   EXPECT_THAT(finished.out, HasSubstr("column"));
 }
 
+TEST(Verify, StressesForParaViewAndADeckForCalculix) {
+  const TempDir folder;
+  const Finished finished =
+      run({"verify", asset("cylinder_on_box"), "--size", "60", "-o", folder / "v.vtu", "-o", folder / "v.inp"});
+  const json report = report_in(folder / "v.report.json");
+  EXPECT_EQ(report["command"], "verify");
+  ASSERT_EQ(report["parts"].size(), 2U);
+  EXPECT_EQ(report["parts"][0]["kind"], "bulk");
+  EXPECT_EQ(report["parts"][1]["kind"], "column");
+  EXPECT_GT(report["parts"][1]["dominance"], 2);
+  EXPECT_GT(report["verification"]["dof"], 1000);
+  EXPECT_LT(report["verification"]["equilibrium"], 1e-6);
+  EXPECT_LT(report["verification"]["residual"], 1e-6);
+  for (const char* field : {"part", "displacement_mm slanted", "stress_mpa from above", "von_mises_mpa slanted"})
+    EXPECT_THAT(content(folder / "v.vtu").substr(0, 4000), HasSubstr(std::string("Name=\"") + field));
+  EXPECT_THAT(content(folder / "v.inp"), HasSubstr("*ELEMENT,TYPE=C3D10,ELSET=PART_1"));
+  EXPECT_THAT(finished.out, HasSubstr("column"));
+}
+
 TEST(Check, TellsAClosedMeshFromAnOpenOne) {
   const TempDir folder;
   write_mesh(folder / "closed.stl", cube(10));

@@ -122,6 +122,36 @@ Mesh joined(const Mesh& a, const Mesh& b) {
   return mesh;
 }
 
+TetMesh bricks(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const std::function<Vec3d(Vec3d)>& place) {
+  const auto id = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) { return (x * (ny + 1) + y) * (nz + 1) + z; };
+  std::vector<Vec3d> nodes;
+  for (std::uint32_t x = 0; x <= nx; ++x) {
+    for (std::uint32_t y = 0; y <= ny; ++y) {
+      for (std::uint32_t z = 0; z <= nz; ++z) nodes.push_back(place({x / double(nx), y / double(ny), z / double(nz)}));
+    }
+  }
+  constexpr std::array<std::array<int, 3>, 6> orders{
+      {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}}};
+  std::vector<std::array<std::uint32_t, 4>> tets;
+  for (std::uint32_t x = 0; x < nx; ++x) {
+    for (std::uint32_t y = 0; y < ny; ++y) {
+      for (std::uint32_t z = 0; z < nz; ++z) {
+        for (std::size_t k = 0; k < 6; ++k) {
+          std::array<std::uint32_t, 3> at{x, y, z};
+          std::array<std::uint32_t, 4> tet{id(x, y, z), 0, 0, 0};
+          for (std::size_t step = 0; step < 3; ++step) {
+            ++at[static_cast<std::size_t>(orders[k][step])];
+            tet[step + 1] = id(at[0], at[1], at[2]);
+          }
+          if (k >= 3) std::swap(tet[2], tet[3]);
+          tets.push_back(tet);
+        }
+      }
+    }
+  }
+  return ten_node(std::move(nodes), tets);
+}
+
 Mesh without_triangle(Mesh mesh, std::size_t index) {
   mesh.triangles.erase(mesh.triangles.begin() + static_cast<std::ptrdiff_t>(index));
   mesh.triangle_colors.clear();

@@ -2,11 +2,14 @@
 // Models for tests: built shapes, the bundled assets, and the shared real meshes where they exist.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
 #include "fibrolite/mesh.h"
+#include "fibrolite/tet_mesh.h"
 
 namespace fibrolite::testing {
 
@@ -19,6 +22,10 @@ Mesh moved(Mesh mesh, Vec3d by);
 Mesh turned(Mesh mesh, int axis, int quarter_turns);  ///< By 90 degrees about x, y or z.
 Mesh joined(const Mesh& a, const Mesh& b);
 Mesh without_triangle(Mesh mesh, std::size_t index);
+
+/// nx * ny * nz bricks over the unit cube, six ten-node tetrahedra each, placed by `place`; midside nodes stay in the
+/// middle.
+TetMesh bricks(std::uint32_t nx, std::uint32_t ny, std::uint32_t nz, const std::function<Vec3d(Vec3d)>& place);
 
 /// assets/models/NAME.ply.
 std::filesystem::path asset(const std::string& name);

@@ -12,6 +12,7 @@
 #include "fibrolite/ops/material.h"
 #include "fibrolite/ops/part.h"
 #include "fibrolite/ops/partition.h"
+#include "fibrolite/ops/stress_field.h"
 
 namespace fibrolite {
 
@@ -31,6 +32,7 @@ struct VerifyParams {
   int triangles = 4000;
   /// The load acts on the surface in here alone; default: on all that is seen from above.
   std::optional<Box3d> load_box_mm{};
+  bool keep_field = false;  ///< Also give the stresses of the whole body, for files.
 };
 struct Verification {
   Parts parts;
@@ -42,6 +44,7 @@ struct Verification {
   /// Length of the traction, MPa, on the plane through a point of the body with a unit normal, in the load case where
   /// it is largest; from the solve of the whole body, taken as solid. Thread-safe.
   std::function<double(Vec3d point_mm, Vec3d normal)> traction_mpa;
+  StressField field;  ///< If asked for. In the frame of the proxy.
 };
 /// Two solves of the whole body (load from above; the same at 45 degrees, at the same place), then each candidate on
 /// its own mesh with the coarse displacements on its cut faces, its own share of the load and of the support. A

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// verify: parts by shape, judged by finite elements; the stresses as files for other programs.
+#include <limits>
+#include <memory>
+
+#include "commands.h"
+#include "fibrolite/ops/stance.h"
+#include "fibrolite/ops/stress_field.h"
+#include "options.h"
+#include "outputs.h"
+#include "run.h"
+#include "summary.h"
+#include "terminal.h"
+
+namespace fibrolite::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct VerifyOptions {
+  ModelOptions model;
+  RecipeOptions recipe;
+  RunOptions run;
+  OutputOptions output;
+};
+
+constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
+
+PartReport part_report(const Part& part) {
+  PartReport row;
+  row.id = part.id();
+  row.kind = name(part.kind());
+  row.volume_mm3 = part.volume_mm3();
+  row.lumen_mm3 = row.infill_volume_mm3 = not_measured;
+  row.centroid_mm = part.centroid_mm();
+  row.axis = part.axis().mean();
+  row.diameter_mm = part.diameter_mm();
+  row.stress = part.stress();
+  row.reason = part.reason();
+  return row;
+}
+
+void run_verify(const VerifyOptions& options) {
+  Recipe recipe = options.recipe.load();
+  recipe.verify.up = direction(options.model.up);
+  std::vector<fs::path> targets = options.output.files;
+  targets.push_back(options.output.report_path());
+
+  const ThreadLimit threads(options.run.threads);
+  const Terminal terminal(options.run);
+  Outputs outputs(targets, options.model.path, options.run.overwrite);
+  const Context& context = terminal.context();
+  Report report;
+  report.command = "verify";
+  report.recipe = recipe;
+  report.infill = "";
+  report.threads = threads.count();
+  Stopwatch stage(report.stages);
+
+  const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
+  report.model.volume_mm3 = signed_volume(model.mesh);
+  const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.5, ""));
+  VerifyParams params = in_stance(recipe.verify);
+  params.keep_field = true;
+  const Verification verified = stage("verify", [&] {
+    return verify(found.proxy, found.partition, params, recipe.material, context.part(0.5, 0.95, "verify"));
+  });
+  report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium};
+  report.warnings.insert(report.warnings.end(), verified.notes.begin(), verified.notes.end());
+  for (const Part& part : placed(verified.parts, found.proxy.frame).parts) report.parts.push_back(part_report(part));
+
+  stage("write", [&] {
+    for (const fs::path& file : options.output.files) {
+      const bool deck = file.extension() == ".inp" || file.extension() == ".INP";
+      if (deck) write_inp(outputs.place(file), verified.field, context);
+      if (!deck) write_vtu(outputs.place(file), verified.field, context);
+    }
+  });
+  write_text(outputs.place(options.output.report_path()), to_json(report));
+  context.check();
+  outputs.commit();
+  context.progress(1);
+  if (!options.run.quiet) print_parts(report, targets);
+}
+
+}  // namespace
+
+void add_verify_command(CLI::App& program) {
+  const auto options = std::make_shared<VerifyOptions>();
+  CLI::App& command =
+      *program.add_subcommand("verify", "Parts and their stresses, for ParaView (.vtu) or CalculiX (.inp)");
+  add_options(command, options->model);
+  add_options(command, options->output, {".vtu", ".inp"});
+  add_options(command, options->recipe);
+  add_options(command, options->run);
+  command.callback([options] { run_verify(*options); });
+}
+
+}  // namespace fibrolite::cli
