@@ -10,12 +10,12 @@
 #include <numbers>
 #include <set>
 
-#include "run_program.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/prepare.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/winding.h"
 #include "mesh_checks.h"
+#include "run_program.h"
 
 namespace {
 
