@@ -23,6 +23,7 @@ using Stress = std::array<double, 6>;
 struct Fixed {
   std::uint32_t node = 0;
   int axis = 0;  ///< 0, 1 or 2.
+  friend bool operator==(const Fixed&, const Fixed&) = default;
 };
 struct LoadCase {
   std::vector<Vec3d> force_n;    ///< One per node; empty: no forces.
