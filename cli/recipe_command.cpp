@@ -12,7 +12,9 @@ namespace {
 std::string explained() {
   std::string text;
   for (const RecipeKey& about : recipe_keys()) text += about.key + "\n    " + about.doc + "\n    " + about.range + "\n";
-  return text;
+  text += "material\n    all four by name\n   ";
+  for (const NamedMaterial& row : materials()) text += " " + row.name;
+  return text + "\n";
 }
 
 }  // namespace

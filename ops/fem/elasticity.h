@@ -21,6 +21,7 @@ using Stress = StressTensor;
 struct Fixed {
   std::uint32_t node = 0;
   int axis = 0;  ///< 0, 1 or 2.
+  friend bool operator==(const Fixed&, const Fixed&) = default;
 };
 struct LoadCase {
   std::vector<Vec3d> force_n;    ///< One per node; empty: no forces.

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "elasticity.h"
+#include "fibrolite/box.h"
 
 namespace fibrolite {
 namespace {
@@ -46,20 +47,11 @@ void rasterize(const TetMesh& mesh, const std::vector<TetFace>& faces, const Foo
 
 }  // namespace
 
-Support Support::of(const TetMesh& body, Vec3d up, double share) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const Vec3d& p : body.nodes) {
-    low = std::min(low, dot(p, up));
-    high = std::max(high, dot(p, up));
-  }
-  return {low + share * (high - low)};
-}
-
 Vec3d Footprint::at(const Point& point) const {
   return frame.to_world({(point.pixel % width + 0.5) * pixel_mm, (point.pixel / width + 0.5) * pixel_mm, point.height});
 }
 
-Footprint seen_from_above(const TetMesh& body, Vec3d up, const Support& support, const std::optional<Box3d>& region) {
+Footprint seen_from_above(const TetMesh& body, Vec3d up, const std::function<bool(Vec3d)>& wanted) {
   Footprint result;
   result.frame = frame_along({}, up);
   Box3d box;
@@ -71,15 +63,21 @@ Footprint seen_from_above(const TetMesh& body, Vec3d up, const Support& support,
 
   constexpr double unseen = -std::numeric_limits<double>::infinity();
   std::vector<double> top(static_cast<std::size_t>(result.width) * static_cast<std::size_t>(result.height), unseen);
-  rasterize(body, boundary(body), result, [&](std::size_t pixel, std::size_t, const auto&, double height) {
-    top[pixel] = std::max(top[pixel], height);
+  std::vector<std::size_t> seen(top.size());
+  const std::vector<TetFace> faces = boundary(body);
+  rasterize(body, faces, result, [&](std::size_t pixel, std::size_t face, const auto&, double height) {
+    if (height <= top[pixel]) return;
+    top[pixel] = height;
+    seen[pixel] = face;
   });
+  std::vector<bool> counted(faces.size(), false);
   for (std::size_t pixel = 0; pixel < top.size(); ++pixel) {
     if (top[pixel] == unseen) continue;
     const Footprint::Point point{static_cast<int>(pixel), top[pixel]};
-    const Vec3d at = result.at(point);
-    if (dot(at, up) <= support.limit_mm || (region && !region->contains(at))) continue;
+    if (!wanted(result.at(point))) continue;
     result.points.push_back(point);
+    result.faces += counted[seen[pixel]] ? 0 : 1;
+    counted[seen[pixel]] = true;
   }
   return result;
 }

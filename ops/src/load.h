@@ -2,22 +2,14 @@
 // The load of the component verification: a force from above, spread over the surface that is seen first.
 #pragma once
 
+#include <cstdint>
 #include <functional>
-#include <optional>
 #include <vector>
 
-#include "fibrolite/box.h"
-#include "fibrolite/context.h"
 #include "fibrolite/frame.h"
 #include "fibrolite/tet_mesh.h"
 
 namespace fibrolite {
-
-/// Heights along `up` that the support and the load keep to.
-struct Support {
-  double limit_mm = 0;  ///< dot(p, up) up to this is fixed and takes no load.
-  [[nodiscard]] static Support of(const TetMesh& body, Vec3d up, double share);
-};
 
 /// The places where a load from above acts, one per pixel of a horizontal raster; each carries the same share of the
 /// force, so the force is spread by projected area.
@@ -30,12 +22,12 @@ struct Footprint {
     double height = 0;  ///< Along up from the frame's origin, mm.
   };
   std::vector<Point> points;  ///< Ascending by pixel.
+  std::int64_t faces = 0;     ///< Triangles that they lie on.
   [[nodiscard]] Vec3d at(const Point& point) const;
 };
-/// What is seen first from above, without what lies at or under the support's limit, or outside `region` if one is
-/// given. Cost: O(faces + pixels), about 400 pixels along the longer side.
-[[nodiscard]] Footprint seen_from_above(const TetMesh& body, Vec3d up, const Support& support,
-                                        const std::optional<Box3d>& region);
+/// What is seen first from above, as far as `wanted` takes it. Cost: O(faces + pixels), about 400 pixels along the
+/// longer side.
+[[nodiscard]] Footprint seen_from_above(const TetMesh& body, Vec3d up, const std::function<bool(Vec3d)>& wanted);
 
 /// The share of the whole force on each node of `mesh` (of the body or of one component of it), from the points that
 /// `mine` accepts. Each goes to the upward face above or below it that is nearest in height; farther than

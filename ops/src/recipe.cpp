@@ -115,6 +115,8 @@ double thinnest_mm(const Recipe& recipe, InfillKind infill) {
 
 void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   const bool hybrid = infill == InfillKind::Hybrid;
+  check_material(recipe.material);
+  check_loads(recipe.loads);
   if (hybrid || infill == InfillKind::Tcs) check_tcs(recipe.tcs);
   if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
   if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);

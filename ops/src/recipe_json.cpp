@@ -9,6 +9,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/ops/recipe.h"
 #include "fibrolite/ops/text.h"
+#include "loads_json.h"
 
 namespace fibrolite {
 namespace {
@@ -91,6 +92,16 @@ Json write(Bridge value) { return value == Bridge::Mst ? "mst" : "bbox"; }
 void read(const Json& json, Bridge& value, Range, const Place& place) {
   if (json != "mst" && json != "bbox") place.refuse(json);
   value = json == "mst" ? Bridge::Mst : Bridge::Bbox;
+}
+
+std::string accepts(const std::vector<LoadCase>&, Range) {
+  std::string names;
+  for (const std::string& name : load_preset_names()) names += "\"" + name + "\", ";
+  return names + "or a list of cases, each with name, supports and forces: see docs/loads.md";
+}
+Json write(const std::vector<LoadCase>& value) { return written(value); }
+void read(const Json& json, std::vector<LoadCase>& value, Range, const Place& place) {
+  value = loads_from(json, place.source);
 }
 
 std::string accepts(const std::uint64_t&, Range) { return "a whole number, 0 or more"; }
@@ -185,6 +196,10 @@ const std::vector<Field>& table() {
       field("material.yield_mpa", &R::material, &Material::yield_mpa, {0, huge, true}, "yield stress"),
 
       field(
+          "loads", [](auto& recipe) -> auto& { return recipe.loads; }, Range{0, 0},
+          "what the model has to carry; paper-verify: verify.load_n from above and at 45 degrees"),
+
+      field(
           "seed", [](auto& recipe) -> auto& { return recipe.seed; }, Range{0, 0}, "of every random number"),
   };
   return rows;
@@ -223,6 +238,8 @@ void apply(Recipe& recipe, const Json& object, const std::string& group, const s
       row->put(recipe, value, source);
     } else if (!is_group(key)) {
       refuse_unknown(key, source);
+    } else if (key == "material" && value.is_string()) {
+      recipe.material = material(value.get<std::string>());
     } else if (value.is_object()) {
       apply(recipe, value, key, source);
     } else {
@@ -278,6 +295,11 @@ Recipe set(const Recipe& base, std::string_view assignment) {
   const std::string key(assignment.substr(0, equals));
   const std::string text(assignment.substr(equals + 1));
   const Field* row = find(key);
+  if (key == "material" && !text.empty()) {  // the one group that has values with names
+    Recipe recipe = base;
+    recipe.material = material(text);
+    return finished(recipe);
+  }
   if (row == nullptr && is_group(key)) {
     Place{key, source, "one of its keys, e.g. --set " + key + ".NAME=VALUE"}.refuse(text);
   }

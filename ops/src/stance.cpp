@@ -44,6 +44,7 @@ VerifyParams in_stance(const VerifyParams& params) {
   VerifyParams standing = params;
   standing.up = {0, 0, 1};
   standing.azimuth_deg = 0;
+  standing.loads = in_frame(frame, params.loads);
   if (params.load_box_mm)
     standing.load_box_mm = mapped(*params.load_box_mm, [&](Vec3d p) { return frame.to_local(p); });
   return standing;

@@ -125,13 +125,13 @@ void write_inp(const std::filesystem::path& path, const StressField& field, cons
   deck.row("*ELASTIC");
   deck.row(field.material.young_mpa, field.material.poisson);
   deck.row("*SOLID SECTION", "ELSET=BODY", "MATERIAL=SOLID");
-  deck.row("*BOUNDARY");
-  for (const StressField::Fixed& f : field.fixed) deck.row(f.node + 1, f.axis + 1, f.axis + 1);
   for (const StressField::Case& load : field.cases) {
     context.check();
     deck.row("** load case: " + load.name);
     deck.row("*STEP");
     deck.row("*STATIC");
+    deck.row("*BOUNDARY", "OP=NEW");
+    for (const StressField::Fixed& f : load.fixed) deck.row(f.node + 1, f.axis + 1, f.axis + 1);
     deck.row("*CLOAD", "OP=NEW");
     for (std::uint32_t n = 0; n < load.force_n.size(); ++n) {
       for (int axis = 0; axis < 3; ++axis) {

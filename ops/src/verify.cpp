@@ -12,12 +12,12 @@
 #include <tuple>
 #include <utility>
 
+#include "applied_load.h"
 #include "component_stress.h"
 #include "elasticity.h"
 #include "fibrolite/error.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "fibrolite/ops/text.h"
-#include "load.h"
 #include "locate.h"
 #include "part_maker.h"
 #include "voxel_tets.h"
@@ -38,21 +38,23 @@ void check_params(const VerifyParams& p) {
   require(norm(p.up) > 0 && std::isfinite(norm(p.up)), "up", "a direction");
 }
 
-/// What both levels share: the load, the support, the material.
+/// What both levels share: the loads, the material.
 struct Setting {
-  Vec3d up;
-  std::vector<Vec3d> forces_n;          // one per load case
-  std::vector<std::string> case_names;  // one per load case
   Material material;
   double voxel_mm;
-  Support support;
-  Footprint footprint;
+  std::vector<LoadCase> cases;
+  std::vector<AppliedLoad> loads;  // the same, found on the body
+};
+
+/// A mesh under every load case.
+struct Loaded {
+  std::vector<std::vector<fem::Fixed>> fixed;
+  std::vector<fem::LoadCase> cases;
 };
 
 struct Model {
   TetMesh mesh;
-  std::vector<fem::Fixed> fixed;
-  std::vector<fem::LoadCase> cases;
+  Loaded loaded;
   std::vector<fem::Solution> solutions;  // one per load case
 };
 
@@ -77,35 +79,53 @@ struct Whole {
   const fem::Locator locator;
 };
 
-std::vector<fem::LoadCase> load_cases(const TetMesh& mesh, const Setting& setting,
-                                      const std::function<bool(Vec3d)>& mine) {
-  const std::vector<double> shares = nodal_shares(mesh, setting.footprint, 2 * setting.voxel_mm, mine);
-  std::vector<fem::LoadCase> cases;
-  for (const Vec3d& force : setting.forces_n) {
-    fem::LoadCase load;
-    load.force_n.reserve(shares.size());
-    for (const double share : shares) load.force_n.push_back(share * force);
-    cases.push_back(std::move(load));
+/// The two load cases of the paper: from above, and the same at 45 degrees at the same place.
+std::vector<LoadCase> built_in(const VerifyParams& params) {
+  Support foot;
+  foot.where.lowest = EndShare{.share = params.support_share};
+  TotalForce force{.newton = params.load_n};
+  force.where.seen_from = Direction{Direction::Of::Up, {}};
+  force.where.box_mm = params.load_box_mm;
+  TotalForce slanted = force;
+  slanted.direction = {Direction::Of::Slanted, {}};
+  return {{"from above", {foot}, {force}}, {"at 45 degrees", {foot}, {slanted}}};
+}
+
+/// Cases that hold the same components share one factorisation.
+std::vector<fem::Solution> solve_all(const TetMesh& mesh, const Material& material, const Loaded& loaded,
+                                     const Context& context) {
+  std::vector<fem::Solution> solutions(loaded.cases.size());
+  std::vector<bool> solved(loaded.cases.size(), false);
+  for (std::size_t first = 0; first < solved.size(); ++first) {
+    if (solved[first]) continue;
+    std::vector<std::size_t> group;
+    std::vector<fem::LoadCase> cases;
+    for (std::size_t c = first; c < solved.size(); ++c) {
+      if (solved[c] || loaded.fixed[c] != loaded.fixed[first]) continue;
+      group.push_back(c);
+      cases.push_back(loaded.cases[c]);
+      solved[c] = true;
+    }
+    auto some = fem::solve(mesh, material, loaded.fixed[first], cases, context);
+    for (std::size_t i = 0; i < group.size(); ++i) solutions[group[i]] = std::move(some[i]);
   }
-  return cases;
+  return solutions;
 }
 
 /// Stage 1: the whole body on a coarse mesh.
-Model solve_body(TetMesh mesh, const VerifyParams& params, Setting& setting, const Context& context) {
-  setting.support = Support::of(mesh, setting.up, params.support_share);
-  setting.footprint = seen_from_above(mesh, setting.up, setting.support, params.load_box_mm);
-  if (setting.footprint.points.empty()) {
-    throw Error(Code::BadRecipe, "nothing of the model is seen from above where the load should act", "verify",
-                "look at up, load_box_mm and support_share");
+Model solve_body(TetMesh mesh, Setting& setting, const LoadSetting& how, const Context& context) {
+  Loaded loaded;
+  for (std::size_t c = 0; c < setting.cases.size(); ++c) {
+    const AppliedLoad& load = setting.loads.emplace_back(setting.cases, c, mesh, how);
+    loaded.cases.push_back({load.forces_n(mesh, [](Vec3d, Vec3d) { return true; }), {}});
+    auto& fixed = loaded.fixed.emplace_back();
+    const auto held = load.held(mesh);
+    for (std::uint32_t node = 0; node < held.size(); ++node)
+      for (int axis = 0; axis < 3; ++axis)
+        if (held[node][static_cast<std::size_t>(axis)]) fixed.push_back({node, axis});
   }
-  std::vector<fem::Fixed> fixed;
-  for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
-    if (dot(mesh.nodes[node], setting.up) > setting.support.limit_mm) continue;
-    for (int axis = 0; axis < 3; ++axis) fixed.push_back({node, axis});
-  }
-  auto cases = load_cases(mesh, setting, [](Vec3d) { return true; });
-  auto solutions = fem::solve(mesh, setting.material, fixed, cases, context);
-  return {std::move(mesh), std::move(fixed), std::move(cases), std::move(solutions)};
+  auto solutions = solve_all(mesh, setting.material, loaded, context);
+  return {std::move(mesh), std::move(loaded), std::move(solutions)};
 }
 
 /// Stage 2: a candidate on its own mesh. On its cut faces it follows the body's coarse displacements.
@@ -113,29 +133,39 @@ Model solve_component(TetMesh mesh, const Model& body, const fem::Locator& locat
                       const Setting& setting, const Context& context) {
   std::vector<float> distance(mesh.nodes.size());
   partition.labels.region(id).evaluate(mesh.nodes, distance);
-  // Asked a voxel below the surface: a cut that runs in the surface itself would give the points to either side at
-  // random.
-  auto cases = load_cases(mesh, setting,
-                          [&](Vec3d p) { return partition.labels.label(p - setting.voxel_mm * setting.up) == id; });
   std::vector<bool> on_cut(mesh.nodes.size(), false);
   for (const TetFace& face : boundary(mesh)) {
     for (const std::uint32_t node : face.nodes) {
       on_cut[node] = static_cast<double>(distance[node]) > -setting.voxel_mm;
     }
   }
-  std::vector<fem::Fixed> fixed;
-  for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
-    const Vec3d p = mesh.nodes[node];
-    const bool supported = dot(p, setting.up) <= setting.support.limit_mm;
-    if (!supported && !on_cut[node]) continue;
-    for (int axis = 0; axis < 3; ++axis) fixed.push_back({node, axis});
-    for (std::size_t c = 0; c < cases.size(); ++c) {
-      const Vec3d u = supported ? Vec3d{} : locator.interpolate(body.solutions[c].displacement_mm, p);
-      cases[c].fixed_mm.insert(cases[c].fixed_mm.end(), {u.x, u.y, u.z});
+  Loaded loaded;
+  for (std::size_t c = 0; c < setting.loads.size(); ++c) {
+    const AppliedLoad& load = setting.loads[c];
+    // Asked a voxel below the surface: a cut that runs in the surface itself would give the points to either side at
+    // random. Other forces need no such question: what falls on a cut acts on nodes that are prescribed.
+    loaded.cases.push_back(
+        {load.forces_n(
+             mesh, [&](Vec3d p, Vec3d to_eye) { return partition.labels.label(p - setting.voxel_mm * to_eye) == id; }),
+         {}});
+    auto& fixed = loaded.fixed.emplace_back();
+    const auto held = load.held(mesh);
+    for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
+      const auto& own = held[node];
+      if (!on_cut[node] && !own[0] && !own[1] && !own[2]) continue;
+      const bool fast = own[0] && own[1] && own[2];
+      const Vec3d u =
+          fast || !on_cut[node] ? Vec3d{} : locator.interpolate(body.solutions[c].displacement_mm, mesh.nodes[node]);
+      for (int axis = 0; axis < 3; ++axis) {
+        const bool mine = own[static_cast<std::size_t>(axis)];
+        if (!mine && !on_cut[node]) continue;
+        fixed.push_back({node, axis});
+        loaded.cases[c].fixed_mm.push_back(mine ? 0 : u[axis]);
+      }
     }
   }
-  auto solutions = fem::solve(mesh, setting.material, fixed, cases, context);
-  return {std::move(mesh), std::move(fixed), std::move(cases), std::move(solutions)};
+  auto solutions = solve_all(mesh, setting.material, loaded, context);
+  return {std::move(mesh), std::move(loaded), std::move(solutions)};
 }
 
 std::vector<std::uint32_t> all_tets(const TetMesh& mesh) {
@@ -288,25 +318,29 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
 
 /// What was solved for the whole body, with everything that a reader of files wants to know.
 StressField stress_field(const Model& body, const Setting& setting, const Labels& labels) {
-  StressField field{body.mesh, {}, setting.material, {}, {}, {}};
+  StressField field{body.mesh, {}, setting.material, {}, {}};
   for (const auto& n : body.mesh.tets)
     field.part.push_back(labels.label(
         0.25 * (body.mesh.nodes[n[0]] + body.mesh.nodes[n[1]] + body.mesh.nodes[n[2]] + body.mesh.nodes[n[3]])));
-  for (const fem::Fixed& f : body.fixed) field.fixed.push_back({f.node, f.axis});
-  for (std::size_t c = 0; c < body.cases.size(); ++c) {
+  for (std::size_t c = 0; c < body.solutions.size(); ++c) {
     const std::vector<Vec3d>& displacement = body.solutions[c].displacement_mm;
-    field.cases.push_back({setting.case_names[c], body.cases[c].force_n, displacement,
-                           fem::nodal_stress(body.mesh, setting.material, displacement)});
+    StressField::Case& solved = field.cases.emplace_back();
+    solved.name = setting.cases[c].name;
+    for (const fem::Fixed& f : body.loaded.fixed[c]) solved.fixed.push_back({f.node, f.axis});
+    solved.force_n = body.loaded.cases[c].force_n;
+    solved.displacement_mm = displacement;
+    solved.stress_mpa = fem::nodal_stress(body.mesh, setting.material, displacement);
   }
   return field;
 }
 
-void account(Verification& result, const Model& model, double load_n) {
+void account(Verification& result, const Model& model, const Setting& setting) {
   result.tets += static_cast<std::int64_t>(model.mesh.tets.size());
   result.dof += 3 * static_cast<std::int64_t>(model.mesh.nodes.size());
-  for (const fem::Solution& s : model.solutions) {
+  for (std::size_t c = 0; c < model.solutions.size(); ++c) {
+    const fem::Solution& s = model.solutions[c];
     result.residual = std::max(result.residual, s.residual);
-    result.equilibrium = std::max(result.equilibrium, norm(s.imbalance_n) / load_n);
+    result.equilibrium = std::max(result.equilibrium, norm(s.imbalance_n) / setting.loads[c].magnitude_n());
   }
 }
 
@@ -349,12 +383,21 @@ TetMesh extract_body(const Proxy& proxy, int triangles, std::vector<std::string>
 Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& given, const Material& material,
                     const Context& context) {
   check_params(given);
+  check_material(material);
+  check_loads(given.loads);
   VerifyParams params = given;
   params.up = normalized(given.up);
-  Setting setting{params.up, {}, {"from above", "slanted"}, material, proxy.solid.grid().voxel_mm, {}, {}};
-  for (const Vec3d& direction : load_directions(params.up, params.azimuth_deg)) {
-    setting.forces_n.push_back(params.load_n * direction);
-  }
+  const double voxel = proxy.solid.grid().voxel_mm;
+  const bool own = !params.loads.empty();
+  Setting setting{material, voxel, own ? params.loads : built_in(params), {}};
+  const LoadSetting how{.up = params.up,
+                        .azimuth_deg = params.azimuth_deg,
+                        .material = material,
+                        .tolerance_mm = 0.5 * voxel,  // that far the simplified surface may lie off
+                        .reach_mm = 2 * voxel,
+                        .labels = partition.labels,
+                        .frame = proxy.frame,
+                        .key = own ? "loads" : "verify"};
   const std::size_t count = partition.candidates.size();
   const bool alone = count == 1;
 
@@ -373,12 +416,14 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     context.progress(0.4 * ++done / static_cast<double>(count + 1));
   });
 
-  const auto whole = std::make_shared<const Whole>(
-      solve_body(std::move(*body_mesh), params, setting, context.part(0.4, 0.65, "verify")));
+  const auto whole =
+      std::make_shared<const Whole>(solve_body(std::move(*body_mesh), setting, how, context.part(0.4, 0.65, "verify")));
   const Model& body = whole->model;
   const fem::Locator& locator = whole->locator;
   result.traction_mpa = [whole](Vec3d p, Vec3d n) { return whole->traction_mpa(p, n); };
-  account(result, body, params.load_n);
+  account(result, body, setting);
+  for (const AppliedLoad& load : setting.loads)
+    result.selected.insert(result.selected.end(), load.selected().begin(), load.selected().end());
   std::vector<double> body_von_mises;
   for (const fem::Solution& s : body.solutions) {
     body_von_mises.push_back(mean_in_world(body.mesh, s.centroid_stress, all_tets(body.mesh)).von_mises);
@@ -407,7 +452,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     decide(verdicts[i], candidate, body_von_mises, params);
   });
   for (std::size_t i = 0; i < count; ++i) {
-    if (components[i]) account(result, *components[i], params.load_n);
+    if (components[i]) account(result, *components[i], setting);
     if (!extracted[i].failure.empty()) {
       result.notes.push_back("candidate " + std::to_string(i) +
                              " is judged by the stresses of the whole body: " + extracted[i].failure);

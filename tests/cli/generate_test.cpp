@@ -270,7 +270,8 @@ TEST(Verify, StressesForParaViewAndADeckForCalculix) {
   EXPECT_GT(report["verification"]["dof"], 1000);
   EXPECT_LT(report["verification"]["equilibrium"], 1e-6);
   EXPECT_LT(report["verification"]["residual"], 1e-6);
-  for (const char* field : {"part", "displacement_mm slanted", "stress_mpa from above", "von_mises_mpa slanted"})
+  for (const char* field :
+       {"part", "displacement_mm at 45 degrees", "stress_mpa from above", "von_mises_mpa at 45 degrees"})
     EXPECT_THAT(content(folder / "v.vtu").substr(0, 4000), HasSubstr(std::string("Name=\"") + field));
   EXPECT_THAT(content(folder / "v.inp"), HasSubstr("*ELEMENT,TYPE=C3D10,ELSET=PART_1"));
   EXPECT_THAT(finished.out, HasSubstr("column"));

@@ -49,10 +49,14 @@ StressField crooked_bar() {
       load.force_n.push_back(p.z > 36 ? Vec3d{random.uniform() - 0.2, random.uniform() - 0.5, -random.uniform()}
                                       : Vec3d{});
   const auto solutions = fem::solve(field.mesh, field.material, fixed, cases);
-  for (const fem::Fixed& f : fixed) field.fixed.push_back({f.node, f.axis});
-  for (std::size_t c = 0; c < cases.size(); ++c)
-    field.cases.push_back({c == 0 ? "one" : "two", cases[c].force_n, solutions[c].displacement_mm,
-                           fem::nodal_stress(field.mesh, field.material, solutions[c].displacement_mm)});
+  for (std::size_t c = 0; c < cases.size(); ++c) {
+    StressField::Case& solved = field.cases.emplace_back();
+    solved.name = c == 0 ? "one" : "two";
+    for (const fem::Fixed& f : fixed) solved.fixed.push_back({f.node, f.axis});
+    solved.force_n = cases[c].force_n;
+    solved.displacement_mm = solutions[c].displacement_mm;
+    solved.stress_mpa = fem::nodal_stress(field.mesh, field.material, solved.displacement_mm);
+  }
   return field;
 }
 
@@ -146,6 +150,7 @@ TEST(Vtu, stresses_and_displacements_turn_into_the_world) {
   field.part = {3};
   field.frame = {{5, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
   field.cases.push_back({"pull",
+                         {},
                          {},
                          std::vector<Vec3d>(10, Vec3d{0, 0, 2}),
                          std::vector<StressTensor>(10, StressTensor{0, 0, 9, 1, 2, 3})});

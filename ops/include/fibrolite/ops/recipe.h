@@ -14,6 +14,7 @@
 #include "fibrolite/ops/infill/mfs.h"
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/joint.h"
+#include "fibrolite/ops/loads.h"
 #include "fibrolite/ops/material.h"
 #include "fibrolite/ops/partition.h"
 #include "fibrolite/ops/verify.h"
@@ -31,6 +32,7 @@ struct Recipe {
   TcsParams tcs;
   JointParams joint;
   Material material;
+  std::vector<LoadCase> loads;  ///< Take the place of verify.loads; none: the two cases of `verify`.
   std::uint64_t seed = 1;
 };
 
@@ -43,7 +45,7 @@ struct Recipe {
 /// nearest key. Keys left out keep the value of `base`. `source_name` is where the text comes from, for messages.
 /// @throws Error BadRecipe.
 [[nodiscard]] Recipe parse_recipe(std::string_view json, const Recipe& base, std::string_view source_name);
-/// "tcs.cell_mm=5": path and value as in --set. @throws Error BadRecipe.
+/// "tcs.cell_mm=5", "material=PETG", "loads=stand": path and value as in --set. @throws Error BadRecipe.
 [[nodiscard]] Recipe set(const Recipe& base, std::string_view assignment);
 /// The whole recipe as pretty JSON that parse_recipe() reads back to the same values.
 [[nodiscard]] std::string to_json(const Recipe& recipe);

@@ -24,9 +24,9 @@ struct StressField {
     std::uint32_t node = 0;
     int axis = 0;  ///< 0, 1 or 2 of the frame's axes.
   };
-  std::vector<Fixed> fixed;  ///< Displacements held at zero.
   struct Case {
     std::string name;
+    std::vector<Fixed> fixed;              ///< Displacements held at zero.
     std::vector<Vec3d> force_n;            ///< Per node.
     std::vector<Vec3d> displacement_mm;    ///< Per node.
     std::vector<StressTensor> stress_mpa;  ///< Per node: that of the tetrahedra around it, weighted by volume.

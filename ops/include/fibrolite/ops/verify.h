@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fibrolite/context.h"
+#include "fibrolite/ops/loads.h"
 #include "fibrolite/ops/material.h"
 #include "fibrolite/ops/part.h"
 #include "fibrolite/ops/partition.h"
@@ -33,6 +34,10 @@ struct VerifyParams {
   /// The load acts on the surface in here alone; default: on all that is seen from above.
   std::optional<Box3d> load_box_mm{};
   bool keep_field = false;  ///< Also give the stresses of the whole body, for files.
+  /// Load cases of the user's, as the parts' frame sees them. If there are any, they take the place of the two built-in
+  /// ones, and load_n, support_share and load_box_mm do nothing; `up` and azimuth_deg still say what "down" and
+  /// "slanted" mean.
+  std::vector<LoadCase> loads{};
 };
 struct Verification {
   Parts parts;
@@ -40,19 +45,23 @@ struct Verification {
   std::int64_t tets = 0, dof = 0;  ///< Of all solves together.
   double residual = 0;             ///< Relative, worst solve.
   double equilibrium = 0;          ///< |sum of reactions + sum of loads| / load, worst solve.
+  std::vector<Selected> selected;  ///< What each support and force of each load case got hold of.
   std::vector<std::string> notes;
   /// Length of the traction, MPa, on the plane through a point of the body with a unit normal, in the load case where
   /// it is largest; from the solve of the whole body, taken as solid. Thread-safe.
   std::function<double(Vec3d point_mm, Vec3d normal)> traction_mpa;
   StressField field;  ///< If asked for. In the frame of the proxy.
 };
-/// Two solves of the whole body (load from above; the same at 45 degrees, at the same place), then each candidate on
-/// its own mesh with the coarse displacements on its cut faces, its own share of the load and of the support. A
+/// A solve of the whole body for each load case (params.loads; if there are none, load from above, and the same at 45
+/// degrees, at the same place), then each candidate on its own mesh with the coarse displacements on its cut faces, its
+/// own share of the load and of the support. A
 /// candidate is a column if it is column-like and its mean stress along its axis is `dominance` times that across in
 /// every load case that loads it. Across: the direction with the largest mean. Touching bulk candidates merge. Parts
 /// are numbered by volume, largest first. If a candidate's own mesh fails, the whole body's stresses in it decide, and
 /// a note says so.
-/// @throws Error SolverFailed, BadRecipe. Cost: seconds. Source: paper Sec. 4.2; axis field and two levels ours.
+/// @throws Error SolverFailed; BadRecipe: a number out of range, a load case that check_loads() refuses, selects
+/// nothing or leaves the body free to move. Cost: seconds. Cases with the same supports share one factorisation.
+/// Source: paper Sec. 4.2; axis field and two levels ours.
 [[nodiscard]] Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& params = {},
                                   const Material& material = {}, const Context& context = {});
 
