@@ -42,7 +42,7 @@ PartReport part_report(const Candidate& candidate) {
   part.centroid_mm = candidate.centroid_mm;
   part.axis = candidate.axis.mean();
   part.diameter_mm = candidate.diameter_mm;
-  part.stress = {not_measured, {not_measured, not_measured}, not_measured, not_measured};
+  part.stress = {not_measured, {not_measured, not_measured}, not_measured, not_measured, {}};
   part.reason = candidate.reason;
   return part;
 }

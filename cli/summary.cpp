@@ -57,6 +57,15 @@ std::string parts_table(const std::vector<PartReport>& parts) {
   return table(rows) + "\n";
 }
 
+std::string strength_table(const std::vector<StrengthReport>& cases) {
+  if (cases.empty()) return {};
+  std::vector<Row> rows{{"load case", "load N", "fails at N", "safety", "p99 MPa", "compliance N mm", "breaks first"}};
+  for (const StrengthReport& s : cases)
+    rows.push_back({s.load_case, measured(s.load_n), measured(s.failure_load_n), measured(s.safety_factor, 3),
+                    measured(s.p99_von_mises_mpa, 3), measured(s.compliance_n_mm), s.weakest});
+  return table(rows) + "\n";
+}
+
 /// Warnings and files, and out with it. The outputs are what was asked for, and they are in place: a failing stdout is
 /// let be.
 void finish(std::string text, const Report& report, const std::vector<std::filesystem::path>& files) {
@@ -72,7 +81,7 @@ void finish(std::string text, const Report& report, const std::vector<std::files
 
 void print_parts(const Report& report, const std::vector<std::filesystem::path>& files) {
   const std::string threshold = "threshold " + measured(report.threshold) + "\n";
-  finish(parts_table(report.parts) + threshold, report, files);
+  finish(parts_table(report.parts) + threshold + strength_table(report.strength), report, files);
 }
 
 void print_summary(const Report& report, const std::vector<std::filesystem::path>& files) {

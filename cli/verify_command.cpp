@@ -5,7 +5,9 @@
 
 #include "commands.h"
 #include "fibrolite/ops/stance.h"
+#include "fibrolite/ops/strength.h"
 #include "fibrolite/ops/stress_field.h"
+#include "fibrolite/winding.h"
 #include "options.h"
 #include "outputs.h"
 #include "run.h"
@@ -22,6 +24,10 @@ struct VerifyOptions {
   RecipeOptions recipe;
   RunOptions run;
   OutputOptions output;
+  bool solid = false;
+  InfillKind infill = InfillKind::Hybrid;
+  std::optional<double> voxel_mm;
+  int coarsen = 0;
 };
 
 constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
@@ -38,6 +44,24 @@ PartReport part_report(const Part& part) {
   row.stress = part.stress();
   row.reason = part.reason();
   return row;
+}
+
+/// The printed solid under the same load cases.
+void analyse_solid(const VerifyOptions& options, const Model& model, const Recipe& recipe, Report& report,
+                   const Context& context) {
+  Stopwatch stage(report.stages);
+  HybridizeParams params{.recipe = recipe, .infill = options.infill, .voxel_mm = options.voxel_mm, .steps = false};
+  check_memory(model.mesh, choose_voxel(bounds(model.mesh), recipe, options.infill, options.voxel_mm), recipe,
+               options.infill, options.run);
+  Report made;
+  const Hybrid hybrid = stage("solid", [&] { return hybridize(model, params, made, context.part(0, 0.4, "fill")); });
+  report.solid = made.solid;
+  report.interfaces = made.interfaces;
+  report.warnings = made.warnings;
+  report.strength = stage("strength", [&] {
+    return strength(hybrid, distance_to(WindingTree(model.mesh)), recipe, {.coarsen = options.coarsen},
+                    context.part(0.4, 1, "strength"));
+  });
 }
 
 void run_verify(const VerifyOptions& options) {
@@ -59,15 +83,17 @@ void run_verify(const VerifyOptions& options) {
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
   report.model.volume_mm3 = signed_volume(model.mesh);
-  const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.5, ""));
-  VerifyParams params = in_stance(recipe.verify);
+  const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.35, ""));
+  VerifyParams params = in_stance(verification(recipe));
   params.keep_field = true;
   const Verification verified = stage("verify", [&] {
-    return verify(found.proxy, found.partition, params, recipe.material, context.part(0.5, 0.95, "verify"));
+    return verify(found.proxy, found.partition, params, recipe.material, context.part(0.35, 0.6, "verify"));
   });
   report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium};
   report.warnings.insert(report.warnings.end(), verified.notes.begin(), verified.notes.end());
   for (const Part& part : placed(verified.parts, found.proxy.frame).parts) report.parts.push_back(part_report(part));
+
+  if (options.solid) analyse_solid(options, model, recipe, report, context.part(0.6, 0.97, "solid"));
 
   stage("write", [&] {
     for (const fs::path& file : options.output.files) {
@@ -91,6 +117,14 @@ void add_verify_command(CLI::App& program) {
       *program.add_subcommand("verify", "Parts and their stresses, for ParaView (.vtu) or CalculiX (.inp)");
   add_options(command, options->model);
   add_options(command, options->output, {".vtu", ".inp"});
+  command.add_flag("--solid", options->solid, "Also the printed solid: what it carries and where it breaks first");
+  add_infill(command, options->infill);
+  add_voxel(command, options->voxel_mm, "Voxel edge of the solid (default: as for generate)");
+  command
+      .add_option("--coarsen", options->coarsen,
+                  "Samples along the edge of a finite element of the solid: 1, 2, 4 (default: the finest of at most "
+                  "four million elements)")
+      ->check(CLI::IsMember({1, 2, 4}));
   add_options(command, options->recipe);
   add_options(command, options->run);
   command.callback([options] { run_verify(*options); });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "component_stress.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -39,6 +40,47 @@ Frame turned_to(const Frame& frame, Vec3d t) {
 
 double MeanStress::dominance() const {
   return axial >= largest_dominance * transverse[0] ? (axial > 0 ? largest_dominance : 0) : axial / transverse[0];
+}
+
+StressSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
+                      const std::vector<std::uint32_t>& tets, const Material& material) {
+  StressSummary result{};
+  std::vector<std::pair<double, double>> by_stress;  // von Mises, volume
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  double all = 0;
+  for (const std::uint32_t t : tets) {
+    const fem::Stress& s = stress[t];
+    const double volume = measure(mesh, t).volume;
+    all += volume;
+    by_stress.emplace_back(von_mises(s), volume);
+    Eigen::Matrix3d tensor;
+    tensor << s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2];
+    sum += volume * tensor;
+    // (1 + nu) / 2E s:s - nu / 2E (tr s)^2
+    const double trace = tensor.trace();
+    result.strain_energy_nmm += volume *
+                                ((1 + material.poisson) * tensor.squaredNorm() - material.poisson * trace * trace) /
+                                (2 * material.young_mpa);
+  }
+  if (!(all > 0)) return result;
+  std::sort(by_stress.begin(), by_stress.end());
+  double below = 0;
+  for (const auto& [value, volume] : by_stress) {
+    below += volume;
+    result.p99_von_mises = value;
+    if (below >= 0.99 * all) break;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum / all);
+  std::array<int, 3> order{0, 1, 2};
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return std::abs(solver.eigenvalues()[a]) > std::abs(solver.eigenvalues()[b]); });
+  for (std::size_t k = 0; k < 3; ++k) result.principal[k] = solver.eigenvalues()[order[k]];
+  const Eigen::Vector3d v = solver.eigenvectors().col(order[0]);
+  Eigen::Index largest = 0;
+  v.cwiseAbs().maxCoeff(&largest);
+  const double sign = v[largest] < 0 ? -1 : 1;
+  result.direction = {sign * v[0], sign * v[1], sign * v[2]};
+  return result;
 }
 
 MeanStress mean_in_axis(const TetMesh& mesh, const std::vector<fem::Stress>& stress,

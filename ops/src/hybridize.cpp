@@ -27,10 +27,8 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   std::function<double(Vec3d, Vec3d)> traction_mpa;
   if (params.infill == InfillKind::Hybrid) {
     // Decided as the model stands under its load, however both lie in the file.
-    VerifyParams given = recipe.verify;
-    given.loads = recipe.loads;
-    const Frame stand = stance(given);
-    const VerifyParams load = in_stance(given);
+    const Frame stand = stance(recipe.verify);
+    const VerifyParams load = in_stance(verification(recipe));
     const Proxy proxy = run("proxy", 0.02, [&](const Context& c) {
       Proxy made = make_proxy(seen_from(stand, model.mesh), {}, c);
       made.frame = stand;

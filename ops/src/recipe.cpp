@@ -92,6 +92,12 @@ void check_joint(const JointParams& joint) {
 
 }  // namespace
 
+VerifyParams verification(const Recipe& recipe) {
+  VerifyParams params = recipe.verify;
+  params.loads = recipe.loads;
+  return params;
+}
+
 std::vector<std::string> preset_names() {
   std::vector<std::string> names;
   for (const Preset& p : presets) names.emplace_back(p.name);

@@ -23,10 +23,25 @@ Json to_json(const ModelReport& model) {
           {"repairs", model.repairs}};
 }
 
+Json to_json(const CaseStress& c) {
+  return {{"load_case", c.load_case},
+          {"axial", c.axial},
+          {"transverse", {c.transverse[0], c.transverse[1]}},
+          {"von_mises", c.von_mises},
+          {"dominance", c.dominance},
+          {"p99_von_mises", c.p99_von_mises},
+          {"strain_energy_nmm", c.strain_energy_nmm},
+          {"principal", {c.principal[0], c.principal[1], c.principal[2]}},
+          {"principal_direction", list(c.principal_direction)}};
+}
+
 Json to_json(const PartReport& part) {
+  Json cases = Json::array();
+  for (const CaseStress& c : part.stress.cases) cases.push_back(to_json(c));
   const Json stress = {{"axial", part.stress.axial},
                        {"transverse", {part.stress.transverse[0], part.stress.transverse[1]}},
-                       {"von_mises", part.stress.von_mises}};
+                       {"von_mises", part.stress.von_mises},
+                       {"load_cases", cases}};
   return {{"id", part.id},
           {"kind", part.kind},
           {"infill", part.infill},
@@ -83,6 +98,23 @@ Json to_json(const MeshCheck& mesh) {
           {"nonmanifold_vertices", mesh.nonmanifold_vertices},
           {"degenerate_triangles", mesh.degenerate_triangles},
           {"shells", mesh.shells}};
+}
+
+Json to_json(const StrengthReport& s) {
+  return {{"load_case", s.load_case},
+          {"load_n", s.load_n},
+          {"compliance_nmm", s.compliance_n_mm},
+          {"max_displacement_mm", s.max_displacement_mm},
+          {"max_von_mises_mpa", s.max_von_mises_mpa},
+          {"p99_von_mises_mpa", s.p99_von_mises_mpa},
+          {"failure_load_n", s.failure_load_n},
+          {"safety_factor", s.safety_factor},
+          {"weakest_mm", list(s.weakest_mm)},
+          {"weakest", s.weakest},
+          {"cells", s.cells},
+          {"cell_mm", s.cell_mm},
+          {"iterations", s.iterations},
+          {"residual", s.residual}};
 }
 
 Json to_json(const StageReport& stage) {
@@ -147,6 +179,7 @@ std::string to_json(const Report& report) {
       {"interfaces", array(report.interfaces)},
       {"solid", to_json(report.solid)},
       {"mesh", to_json(report.mesh)},
+      {"strength", array(report.strength)},
       {"threads", report.threads},
       {"stages", array(report.stages)},
       {"warnings", report.warnings}};

@@ -81,7 +81,9 @@ Parts placed(const Parts& parts, const Frame& frame) {
   Parts result;
   result.labels = parts.labels.placed(frame);
   for (const Cut& cut : parts.cuts) result.cuts.push_back(placed(cut, frame));
-  for (const Part& part : parts.parts)
+  for (const Part& part : parts.parts) {
+    PartStress stress = part.stress();
+    for (CaseStress& c : stress.cases) c.principal_direction = turned(frame, c.principal_direction);
     result.parts.push_back(
         PartMaker::make({.id = part.id(),
                          .kind = part.kind(),
@@ -91,8 +93,9 @@ Parts placed(const Parts& parts, const Frame& frame) {
                          .diameter_mm = part.diameter_mm(),
                          .volume_mm3 = part.volume_mm3(),
                          .centroid_mm = frame.to_world(part.centroid_mm()),
-                         .stress = part.stress(),
+                         .stress = std::move(stress),
                          .reason = part.reason()}));
+  }
   return result;
 }
 

@@ -79,18 +79,6 @@ struct Whole {
   const fem::Locator locator;
 };
 
-/// The two load cases of the paper: from above, and the same at 45 degrees at the same place.
-std::vector<LoadCase> built_in(const VerifyParams& params) {
-  Support foot;
-  foot.where.lowest = EndShare{.share = params.support_share};
-  TotalForce force{.newton = params.load_n};
-  force.where.seen_from = Direction{Direction::Of::Up, {}};
-  force.where.box_mm = params.load_box_mm;
-  TotalForce slanted = force;
-  slanted.direction = {Direction::Of::Slanted, {}};
-  return {{"from above", {foot}, {force}}, {"at 45 degrees", {foot}, {slanted}}};
-}
-
 /// Cases that hold the same components share one factorisation.
 std::vector<fem::Solution> solve_all(const TetMesh& mesh, const Material& material, const Loaded& loaded,
                                      const Context& context) {
@@ -187,16 +175,29 @@ std::vector<std::uint32_t> tets_of(const TetMesh& mesh, const Labels& labels, in
 /// How a candidate carries each load case, and what is decided from that.
 struct Verdict {
   std::vector<MeanStress> cases;
+  std::vector<CaseStress> carried;
   Kind kind = Kind::Bulk;
   PartStress stress;
   std::string reason;
 };
 
 void measure(Verdict& verdict, const Model& model, const std::vector<std::uint32_t>& tets, const Axis& axis,
-             bool world_axes) {
-  for (const fem::Solution& s : model.solutions) {
-    verdict.cases.push_back(world_axes ? mean_in_world(model.mesh, s.centroid_stress, tets)
-                                       : mean_in_axis(model.mesh, s.centroid_stress, tets, axis));
+             const Setting& setting, bool world_axes) {
+  for (std::size_t c = 0; c < model.solutions.size(); ++c) {
+    const std::vector<fem::Stress>& stress = model.solutions[c].centroid_stress;
+    const MeanStress mean =
+        world_axes ? mean_in_world(model.mesh, stress, tets) : mean_in_axis(model.mesh, stress, tets, axis);
+    verdict.cases.push_back(mean);
+    const StressSummary more = summary(model.mesh, stress, tets, setting.material);
+    verdict.carried.push_back({.load_case = setting.cases[c].name,
+                               .axial = mean.axial,
+                               .transverse = {mean.transverse[0], mean.transverse[1]},
+                               .von_mises = mean.von_mises,
+                               .dominance = mean.dominance(),
+                               .p99_von_mises = more.p99_von_mises,
+                               .strain_energy_nmm = more.strain_energy_nmm,
+                               .principal = {more.principal[0], more.principal[1], more.principal[2]},
+                               .principal_direction = more.direction});
   }
 }
 
@@ -217,7 +218,8 @@ void decide(Verdict& verdict, const Candidate& candidate, const std::vector<doub
   verdict.stress = {shown.axial,
                     {shown.transverse[0], shown.transverse[1]},
                     shown.von_mises,
-                    worst != nullptr ? worst->dominance() : 0};
+                    worst != nullptr ? worst->dominance() : 0,
+                    verdict.carried};
   const bool dominant = worst != nullptr && worst->dominance() >= params.dominance;
   verdict.kind = candidate.column_like && dominant ? Kind::Column : Kind::Bulk;
 
@@ -380,6 +382,18 @@ TetMesh extract_body(const Proxy& proxy, int triangles, std::vector<std::string>
 
 }  // namespace
 
+std::vector<LoadCase> load_cases(const VerifyParams& params) {
+  if (!params.loads.empty()) return params.loads;
+  Support foot;
+  foot.where.lowest = EndShare{.share = params.support_share};
+  TotalForce force{.newton = params.load_n};
+  force.where.seen_from = Direction{Direction::Of::Up, {}};
+  force.where.box_mm = params.load_box_mm;
+  TotalForce slanted = force;
+  slanted.direction = {Direction::Of::Slanted, {}};
+  return {{"from above", {foot}, {force}}, {"at 45 degrees", {foot}, {slanted}}};
+}
+
 Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& given, const Material& material,
                     const Context& context) {
   check_params(given);
@@ -389,7 +403,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   params.up = normalized(given.up);
   const double voxel = proxy.solid.grid().voxel_mm;
   const bool own = !params.loads.empty();
-  Setting setting{material, voxel, own ? params.loads : built_in(params), {}};
+  Setting setting{material, voxel, load_cases(params), {}};
   const LoadSetting how{.up = params.up,
                         .azimuth_deg = params.azimuth_deg,
                         .material = material,
@@ -444,10 +458,10 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
       }
     }
     if (components[i]) {
-      measure(verdicts[i], *components[i], all_tets(components[i]->mesh), candidate.axis, params.world_axes);
+      measure(verdicts[i], *components[i], all_tets(components[i]->mesh), candidate.axis, setting, params.world_axes);
     } else {
       const auto tets = alone ? all_tets(body.mesh) : tets_of(body.mesh, partition.labels, id);
-      measure(verdicts[i], body, tets, candidate.axis, params.world_axes);
+      measure(verdicts[i], body, tets, candidate.axis, setting, params.world_axes);
     }
     decide(verdicts[i], candidate, body_von_mises, params);
   });

@@ -30,7 +30,7 @@ Report filled() {
   part.fibres = 19;
   part.centroid_mm = {1, 2, 3};
   part.axis = {0, 0, 1};
-  part.stress = {-5, {0.5, 0.25}, 5.5, 10};
+  part.stress = {-5, {0.5, 0.25}, 5.5, 10, {}};
   part.reason = "carries along its axis";
   report.parts = {part};
   InterfaceReport interface;

@@ -13,6 +13,17 @@ namespace fibrolite {
 enum class Kind { Column, Bulk };
 [[nodiscard]] constexpr const char* name(Kind kind) { return kind == Kind::Column ? "column" : "bulk"; }
 
+/// How a part carries one load case, MPa; of merged pieces: the largest.
+struct CaseStress {
+  std::string load_case;
+  double axial = 0, transverse[2] = {0, 0}, von_mises = 0;  ///< Means, as in PartStress.
+  double dominance = 0;
+  double p99_von_mises = 0;         ///< 99 % of the volume is at or below it.
+  double strain_energy_nmm = 0;     ///< From the mean stress of each tetrahedron.
+  double principal[3] = {0, 0, 0};  ///< Of the mean stress, largest magnitude first.
+  Vec3d principal_direction{};      ///< Of the first of them, unit.
+};
+
 /// Mean stress of a part in its own axis field, of the load case that decided (the one with the smallest dominance),
 /// MPa. Of merged pieces: of the largest.
 struct PartStress {
@@ -20,6 +31,7 @@ struct PartStress {
   double transverse[2] = {0, 0};
   double von_mises = 0;
   double dominance = 0;  ///< axial / transverse[0], the smallest over the load cases that load it; 0 if unloaded.
+  std::vector<CaseStress> cases{};  ///< All of them.
 };
 
 class Part {

@@ -36,6 +36,9 @@ struct Recipe {
   std::uint64_t seed = 1;
 };
 
+/// What verify() takes of a recipe: its numbers, and the load cases.
+[[nodiscard]] VerifyParams verification(const Recipe& recipe);
+
 /// Names for --preset, first is the default.
 [[nodiscard]] std::vector<std::string> preset_names();
 /// @throws Error BadRecipe: unknown preset (with the nearest name).

@@ -62,6 +62,20 @@ struct VerificationReport {
   std::int64_t tets = 0, dof = 0;        ///< Of all solves together.
   double residual = 0, equilibrium = 0;  ///< Relative, of the worst solve.
 };
+/// What the finished solid carries under one load case (strength.h).
+struct StrengthReport {
+  std::string load_case;
+  double load_n = 0, compliance_n_mm = 0, max_displacement_mm = 0;
+  double max_von_mises_mpa = 0, p99_von_mises_mpa = 0;
+  double failure_load_n = 0;  ///< load * yield / p99.
+  double safety_factor = 0;   ///< yield / p99.
+  Vec3d weakest_mm{};
+  std::string weakest;
+  std::int64_t cells = 0;
+  double cell_mm = 0;
+  int iterations = 0;
+  double residual = 0;
+};
 struct Report {
   std::string command;
   Recipe recipe;
@@ -74,6 +88,7 @@ struct Report {
   std::vector<InterfaceReport> interfaces;
   SolidReport solid;
   MeshCheck mesh;
+  std::vector<StrengthReport> strength;  ///< Empty if it was not asked for.
   std::vector<StageReport> stages;
   std::vector<std::string> warnings;
 };

@@ -65,6 +65,10 @@ struct Verification {
 [[nodiscard]] Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& params = {},
                                   const Material& material = {}, const Context& context = {});
 
+/// The load cases that verify() solves: the user's, or the two of the paper: from above, and the same at 45 degrees at
+/// the same place.
+[[nodiscard]] std::vector<LoadCase> load_cases(const VerifyParams& params);
+
 /// The whole body as one part of a given kind, for runs that skip partition and verification. A column's axis is the
 /// longest principal axis of the body.
 [[nodiscard]] Parts whole_body(const Mesh& model, Kind kind);

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/strength.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+#include "applied_load.h"
+#include "fibrolite/blocks.h"
+#include "fibrolite/error.h"
+#include "fibrolite/ops/assemble.h"
+#include "fibrolite/ops/text.h"
+#include "fibrolite/realize.h"
+#include "fibrolite/voxel_fem.h"
+#include "load.h"
+
+namespace fibrolite {
+namespace {
+
+/// What is seen first from a direction: the heights of the material along it, one per pixel across it. Negative on the
+/// topmost layer of each pixel, as thick as `layer_mm`.
+class Seen final : public Shape::Function {
+ public:
+  Seen(const Solid& solid, Vec3d to_eye, double pixel_mm, double layer_mm)
+      : frame_(frame_along({}, to_eye)), pixel_mm_(pixel_mm), layer_mm_(layer_mm) {
+    Box3d box;  // in the frame
+    const Box3d world = solid.bounds_mm().grown(2 * pixel_mm);
+    for (unsigned corner = 0; corner < 8; ++corner)
+      box.include(frame_.to_local({(corner & 1U) != 0 ? world.max.x : world.min.x,
+                                   (corner & 2U) != 0 ? world.max.y : world.min.y,
+                                   (corner & 4U) != 0 ? world.max.z : world.min.z}));
+    low_ = box.min;
+    width_ = static_cast<std::size_t>(std::ceil(box.size().x / pixel_mm)) + 1;
+    height_.assign(width_ * (static_cast<std::size_t>(std::ceil(box.size().y / pixel_mm)) + 1), -far_mm);
+    const Shape material = distance_to(solid);
+    std::mutex mutex;
+    for_each_block(blocks(solid), solid.grid().voxel_mm, [&](std::size_t, const PointBlock& block) {
+      std::array<float, PointBlock::capacity> value;
+      material.evaluate(block, value.data());
+      std::vector<std::pair<std::size_t, float>> found;
+      for (int i = 0; i < block.count; ++i) {
+        if (value[static_cast<std::size_t>(i)] >= 0) continue;
+        const Vec3d p = frame_.to_local({block.x[i], block.y[i], block.z[i]});
+        // The surface lies as far above the sample as its distance says, at most half a voxel.
+        const double top = p.z + std::min(-static_cast<double>(value[static_cast<std::size_t>(i)]), 0.5 * pixel_mm_);
+        found.emplace_back(pixel(p), static_cast<float>(top));
+      }
+      const std::lock_guard lock(mutex);  // the largest, whoever comes first
+      for (const auto& [at, top] : found) height_[at] = std::max(height_[at], top);
+    });
+  }
+
+  void evaluate(const PointBlock& block, float* out) const override {
+    for (int i = 0; i < block.count; ++i) {
+      const Vec3d p = frame_.to_local({block.x[i], block.y[i], block.z[i]});
+      const Vec3d q{p.x - low_.x, p.y - low_.y, 0};
+      const bool beside =
+          q.x < 0 || q.y < 0 || q.x >= static_cast<double>(width_) * pixel_mm_ || pixel(p) >= height_.size();
+      const double below = beside ? far_mm : static_cast<double>(height_[pixel(p)]) - p.z;
+      out[i] = static_cast<float>(below - layer_mm_);
+    }
+  }
+  [[nodiscard]] Interval bound(const Box3d&) const override { return {-far_mm, far_mm}; }
+
+ private:
+  [[nodiscard]] std::size_t pixel(Vec3d local) const {
+    const auto at = [&](double x) { return static_cast<std::size_t>(std::max(0.0, x / pixel_mm_)); };
+    return at(local.y - low_.y) * width_ + at(local.x - low_.x);
+  }
+
+  Frame frame_;
+  double pixel_mm_, layer_mm_;
+  Vec3d low_{};
+  std::size_t width_ = 0;
+  std::vector<float> height_;
+};
+
+/// Turns load cases into supports and forces on cells.
+class OnVoxels {
+ public:
+  OnVoxels(const Solid& solid, const VerifyParams& verify, const Material& material, double cell_mm)
+      : solid_(solid), up_(normalized(verify.up)), verify_(verify), material_(material), cell_mm_(cell_mm) {}
+
+  VoxelFemProblem problem(const LoadCase& load) {
+    VoxelFemProblem problem;
+    problem.solid = solid_;
+    problem.young_mpa = material_.young_mpa;
+    problem.poisson = material_.poisson;
+    std::vector<Shape> clamped;
+    for (const Support& support : load.supports) {
+      VoxelSupport held{.where = shape(support.where, load.name), .axes = {true, true, true}, .displacement_mm = {}};
+      if (support.sliding) held.axes = axes_of(*support.sliding, load.name);
+      clamped.push_back(offset(held.where, cell_mm_));
+      problem.supports.push_back(std::move(held));
+    }
+    const Shape supports = unite(clamped);
+    for (const Force& force : load.forces) {
+      if (const auto* total = std::get_if<TotalForce>(&force)) {
+        const Shape where = subtract(shape(total->where, load.name), supports);
+        problem.forces.push_back({where, total->newton * unit(total->direction)});
+        clamped.push_back(offset(where, 2 * cell_mm_));
+        load_n_ += total->newton;
+      } else if (const auto* gravity = std::get_if<Gravity>(&force)) {
+        const Vec3d weight = weight_n_per_mm3(material_) * unit(gravity->direction);
+        problem.body_force_n_mm3 = [weight](Vec3d) { return weight; };
+        load_n_ += norm(weight) * solid_.volume_mm3();
+      } else {
+        throw Error(Code::Unsupported, "a pressure acts on bodies, not yet on finished solids", load.name,
+                    "state it as a force");
+      }
+    }
+    problem.unmeasured = unite(clamped);
+    return problem;
+  }
+  [[nodiscard]] double load_n() const { return load_n_; }
+
+ private:
+  [[nodiscard]] Vec3d unit(const Direction& d) const {
+    switch (d.of) {
+      case Direction::Of::World:
+        return normalized(d.vector);
+      case Direction::Of::Up:
+        return up_;
+      case Direction::Of::Down:
+        return -up_;
+      case Direction::Of::Slanted:
+        return load_directions(up_, verify_.azimuth_deg)[1];
+    }
+    return {};
+  }
+  [[nodiscard]] std::array<bool, 3> axes_of(const Direction& d, const std::string& name) const {
+    const Vec3d along = unit(d);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (std::abs(std::abs(along[axis]) - 1) > 1e-6) continue;
+      std::array<bool, 3> axes{};
+      axes[static_cast<std::size_t>(axis)] = true;
+      return axes;
+    }
+    throw Error(Code::Unsupported, "on a finished solid a support slides across x, y or z alone", name,
+                "turn the model, or hold it fast");
+  }
+  /// Reaches half a cell farther, as on tetrahedra: a plane stated in a face holds that face.
+  Shape shape(const Selection& where, const std::string& name) {
+    std::vector<Shape> all;
+    if (where.box_mm) all.push_back(cuboid(where.box_mm->grown(0.5 * cell_mm_)));
+    for (const HalfSpace& half : where.half_spaces)
+      all.push_back(half_space(half.point_mm + 0.5 * cell_mm_ * normalized(half.normal), half.normal));
+    if (where.lowest) all.push_back(end(*where.lowest, unit(where.lowest->along)));
+    if (where.highest) all.push_back(end(*where.highest, -unit(where.highest->along)));
+    if (where.label)
+      throw Error(Code::Unsupported, "a selection by label is for bodies, not for finished solids", name,
+                  "select by a box or half-spaces");
+    if (where.seen_from)
+      all.push_back(Shape(std::make_shared<Seen>(solid_, unit(*where.seen_from), cell_mm_, 0.75 * cell_mm_)));
+    return intersect(std::move(all));
+  }
+  [[nodiscard]] Shape end(const EndShare& share, Vec3d along) const {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    const Box3d box = solid_.bounds_mm();  // along other directions than x, y, z the corners of the box count
+    for (unsigned corner = 0; corner < 8; ++corner) {
+      const double at =
+          dot(along, {(corner & 1U) != 0 ? box.max.x : box.min.x, (corner & 2U) != 0 ? box.max.y : box.min.y,
+                      (corner & 4U) != 0 ? box.max.z : box.min.z});
+      low = std::min(low, at);
+      high = std::max(high, at);
+    }
+    return half_space((low + share.share * (high - low)) * along, along);
+  }
+
+  const Solid& solid_;
+  const Vec3d up_;
+  const VerifyParams& verify_;
+  const Material& material_;
+  const double cell_mm_;
+  double load_n_ = 0;
+};
+
+std::string whose(const Hybrid& hybrid, const Recipe& recipe, const Shape& body, Vec3d p) {
+  const double voxel = hybrid.solid.grid().voxel_mm;
+  for (std::size_t i = 0; i < hybrid.joints.size(); ++i)
+    if (hybrid.joints[i].shape(p) < voxel)
+      return "joint " + std::to_string(i) + " between parts " + std::to_string(hybrid.interfaces[i].a) + " and " +
+             std::to_string(hybrid.interfaces[i].b);
+  const Part& part = hybrid.parts.parts[static_cast<std::size_t>(hybrid.parts.labels.label(p))];
+  const bool in_shell = body(p) > -recipe.shell.thickness_mm;
+  return std::string(in_shell ? "shell" : "infill") + " of part " + std::to_string(part.id()) + " (" +
+         name(part.kind()) + ")";
+}
+
+/// Cells with material at most: what the finest grid has, less by the cube of the coarsening.
+int choose_coarsening(const Solid& solid, std::int64_t most_cells) {
+  const double voxel = solid.grid().voxel_mm, cells = solid.volume_mm3() / (voxel * voxel * voxel);
+  for (const int coarsen : {1, 2}) {
+    // Surfaces cut cells: the coarser, the more of them hold little.
+    if (1.3 * coarsen * cells / (coarsen * coarsen * coarsen) <= static_cast<double>(most_cells)) return coarsen;
+  }
+  return 4;
+}
+
+}  // namespace
+
+std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, const Recipe& recipe,
+                                     const StrengthParams& params, const Context& context) {
+  if (params.coarsen != 0 && params.coarsen != 1 && params.coarsen != 2 && params.coarsen != 4)
+    throw Error(Code::BadRecipe, "cells are coarsened by 1, 2 or 4", "coarsen", "use 0 to have it chosen");
+  const VerifyParams verify = verification(recipe);
+  const std::vector<LoadCase> cases = load_cases(verify);
+  const int coarsen = params.coarsen != 0 ? params.coarsen : choose_coarsening(hybrid.solid, params.most_cells);
+  const double cell_mm = coarsen * hybrid.solid.grid().voxel_mm;
+  std::vector<StrengthReport> result;
+  for (std::size_t c = 0; c < cases.size(); ++c) {
+    const auto share = [&](std::size_t i) { return static_cast<double>(i) / static_cast<double>(cases.size()); };
+    OnVoxels voxels(hybrid.solid, verify, recipe.material, cell_mm);
+    VoxelFemProblem problem = voxels.problem(cases[c]);
+    problem.coarsen = coarsen;
+    problem.residual = params.residual;
+    const VoxelFemResult solved = solve(problem, context.part(share(c), share(c + 1), cases[c].name));
+    StrengthReport& answer = result.emplace_back();
+    answer.load_case = cases[c].name;
+    answer.load_n = voxels.load_n();
+    answer.compliance_n_mm = solved.compliance_n_mm;
+    answer.max_displacement_mm = solved.max_displacement_mm;
+    answer.max_von_mises_mpa = solved.max_von_mises_mpa;
+    answer.p99_von_mises_mpa = solved.p99_von_mises_mpa;
+    answer.safety_factor = recipe.material.yield_mpa / solved.p99_von_mises_mpa;
+    answer.failure_load_n = answer.load_n * answer.safety_factor;
+    answer.weakest_mm = solved.weakest_mm;
+    answer.weakest = whose(hybrid, recipe, body, solved.weakest_mm);
+    answer.cells = solved.cells;
+    answer.cell_mm = cell_mm;
+    answer.iterations = solved.iterations;
+    answer.residual = solved.residual;
+  }
+  return result;
+}
+
+}  // namespace fibrolite
