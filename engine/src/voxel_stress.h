@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stress in the cells of a voxel model.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "fibrolite/shape.h"
+#include "voxel_element.h"
+#include "voxel_model.h"
+
+namespace fibrolite {
+
+/// xx yy zz xy yz zx, MPa.
+using CellStress = std::array<double, 6>;
+[[nodiscard]] double von_mises(const CellStress& s);
+/// At the centre of a cell whose lowest corner has this place in the block's table of nodes.
+[[nodiscard]] CellStress cell_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa,
+                                     double poisson, const std::vector<double>& u, const std::uint32_t* table, int low);
+
+struct StressSummary {
+  double max_mpa = 0, p99_mpa = 0, peak_mpa = 0;
+  Vec3d weakest_mm{};
+};
+/// Over cells of at least half the fraction of the fullest cell whose centre is not in `unmeasured`. Cost: O(cells),
+/// parallel; the same bits on any number of threads.
+[[nodiscard]] StressSummary measure_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa,
+                                           double poisson, const std::vector<double>& u, const Shape& unmeasured);
+
+}  // namespace fibrolite
