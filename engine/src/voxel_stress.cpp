@@ -10,11 +10,6 @@
 
 namespace fibrolite {
 
-double von_mises(const CellStress& s) {
-  const double a = s[0] - s[1], b = s[1] - s[2], c = s[2] - s[0];
-  return std::sqrt(0.5 * (a * a + b * b + c * c) + 3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
-}
-
 CellStress cell_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa, double poisson,
                        const std::vector<double>& u, const std::uint32_t* table, int low) {
   std::array<double, 6> strain{};
@@ -27,8 +22,12 @@ CellStress cell_stress(const VoxelModel& model, const VoxelElement& element, dou
   const double mu = 0.5 * young_mpa / ((1 + poisson) * model.edge_mm);
   const double lambda = young_mpa * poisson / ((1 + poisson) * (1 - 2 * poisson) * model.edge_mm);
   const double spread = lambda * (strain[0] + strain[1] + strain[2]);
-  return {spread + 2 * mu * strain[0], spread + 2 * mu * strain[1], spread + 2 * mu * strain[2],
-          mu * strain[3],              mu * strain[4],              mu * strain[5]};
+  return {spread + 2 * mu * strain[0],
+          spread + 2 * mu * strain[1],
+          spread + 2 * mu * strain[2],
+          mu * strain[3],
+          mu * strain[4],
+          mu * strain[5]};
 }
 
 namespace {

@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "fibrolite/shape.h"
+#include "fibrolite/stress.h"
 #include "voxel_element.h"
 #include "voxel_model.h"
 
 namespace fibrolite {
 
 /// xx yy zz xy yz zx, MPa.
-using CellStress = std::array<double, 6>;
-[[nodiscard]] double von_mises(const CellStress& s);
+using CellStress = StressTensor;
 /// At the centre of a cell whose lowest corner has this place in the block's table of nodes.
 [[nodiscard]] CellStress cell_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa,
                                      double poisson, const std::vector<double>& u, const std::uint32_t* table, int low);

@@ -42,9 +42,9 @@ double MeanStress::dominance() const {
   return axial >= largest_dominance * transverse[0] ? (axial > 0 ? largest_dominance : 0) : axial / transverse[0];
 }
 
-StressSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
+ComponentSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
                       const std::vector<std::uint32_t>& tets, const Material& material) {
-  StressSummary result{};
+  ComponentSummary result{};
   std::vector<std::pair<double, double>> by_stress;  // von Mises, volume
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   double all = 0;

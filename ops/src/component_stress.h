@@ -24,13 +24,13 @@ struct MeanStress {
 };
 
 /// What else a component's stresses say, over its volume.
-struct StressSummary {
+struct ComponentSummary {
   double p99_von_mises = 0;         ///< MPa; 99 % of the volume is at or below it.
   double strain_energy_nmm = 0;     ///< From the mean stress of each tetrahedron.
   std::array<double, 3> principal;  ///< Of the mean stress, MPa, largest magnitude first.
   Vec3d direction{};                ///< Of the first of them; its largest component is positive.
 };
-[[nodiscard]] StressSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
+[[nodiscard]] ComponentSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
                                     const std::vector<std::uint32_t>& tets, const Material& material);
 
 /// In the axis field. Directions across are turned along with t(x), so "the same direction" has a meaning along a bent

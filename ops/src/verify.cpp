@@ -188,7 +188,7 @@ void measure(Verdict& verdict, const Model& model, const std::vector<std::uint32
     const MeanStress mean =
         world_axes ? mean_in_world(model.mesh, stress, tets) : mean_in_axis(model.mesh, stress, tets, axis);
     verdict.cases.push_back(mean);
-    const StressSummary more = summary(model.mesh, stress, tets, setting.material);
+    const ComponentSummary more = summary(model.mesh, stress, tets, setting.material);
     verdict.carried.push_back({.load_case = setting.cases[c].name,
                                .axial = mean.axial,
                                .transverse = {mean.transverse[0], mean.transverse[1]},
