@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "fibrolite/error.h"
@@ -272,6 +275,29 @@ TEST(Materials, ByNameAndByNumber) {
   EXPECT_NE(refusal_of(R"({"material": 5})"), "");
   EXPECT_THAT(refusal_of(R"({"material": {"density_g_cm3": 0}})"), HasSubstr("material.density_g_cm3"));
   EXPECT_THAT(refusal_of(R"({"material": {"yield_mpa": -1}})"), HasSubstr("material.yield_mpa"));
+}
+
+/// docs/loads.md promises: its examples are recipes, its table is the one in the code.
+TEST(Loads, ThePageAboutThemHolds) {
+  std::ifstream in(std::filesystem::path(FIBROLITE_ASSETS).parent_path() / "docs" / "loads.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  int examples = 0;
+  const std::string fence = "```json\n";
+  for (std::size_t at = page.find(fence); at != std::string::npos; at = page.find(fence, at + 1), ++examples) {
+    const std::size_t begin = at + fence.size();
+    EXPECT_EQ(refusal_of(page.substr(begin, page.find("```", begin) - begin)), "");
+  }
+  EXPECT_EQ(examples, 2);
+  for (const NamedMaterial& row : materials()) {
+    const Material& m = row.material;
+    const std::string numbers = " | " + number_text(m.density_g_cm3) + " | " + number_text(m.young_mpa) + " | ";
+    const auto at = page.find("| `" + row.name + "`");
+    ASSERT_NE(at, std::string::npos) << row.name;
+    const std::string line = page.substr(at, page.find('\n', at) - at);
+    EXPECT_THAT(line, HasSubstr(numbers));
+    EXPECT_THAT(line, HasSubstr(" | " + number_text(m.yield_mpa) + " | "));
+    EXPECT_NEAR(std::stod(line.substr(line.find(numbers) + numbers.size())), m.poisson, 1e-12);
+  }
 }
 
 TEST(CheckRecipe, TwoVoxelsIsTheLimit) {
