@@ -47,6 +47,7 @@ std::vector<fem::Solution> solve_cases(const TetMesh& mesh, const Material& mate
                                        const std::vector<HeldCase>& cases, const Context& context) {
   std::vector<fem::Solution> solutions(cases.size());
   std::vector<bool> solved(cases.size(), false);
+  std::size_t done = 0;
   for (std::size_t first = 0; first < cases.size(); ++first) {
     if (solved[first]) continue;
     const HeldCase& held = cases[first];
@@ -58,9 +59,14 @@ std::vector<fem::Solution> solve_cases(const TetMesh& mesh, const Material& mate
       loads.push_back(cases[c].load);
       solved[c] = true;
     }
+    const auto share = [&](std::size_t count) {
+      return static_cast<double>(count) / static_cast<double>(cases.size());
+    };
+    const Context part = context.part(share(done), share(done + group.size()), "verify");
+    done += group.size();
     auto some = same_axes(held.frame, Frame{})
-                    ? fem::solve(mesh, material, held.fixed, loads, context)
-                    : solve_in(held.frame, mesh, material, held.fixed, std::move(loads), context);
+                    ? fem::solve(mesh, material, held.fixed, loads, part)
+                    : solve_in(held.frame, mesh, material, held.fixed, std::move(loads), part);
     for (std::size_t i = 0; i < group.size(); ++i) solutions[group[i]] = std::move(some[i]);
   }
   return solutions;
