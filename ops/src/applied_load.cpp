@@ -13,108 +13,19 @@
 #include "fibrolite/error.h"
 #include "fibrolite/ops/text.h"
 #include "load.h"
+#include "region.h"
 
 namespace fibrolite {
 namespace {
 
-/// What lies on the inner side: dot(p, normal) <= offset.
-struct Plane {
-  Vec3d normal;  // unit
-  double offset;
-  double tolerance;  // along the surface's normal
-};
-
-/// A selection as planes and a label; seen_from is not part of it.
-struct Region {
-  std::vector<Plane> planes;
-  std::optional<int> label;
-
-  [[nodiscard]] bool contains(Vec3d p, const Labels& labels) const {
-    return std::all_of(planes.begin(), planes.end(),
-                       [&](const Plane& plane) { return dot(p, plane.normal) <= plane.offset + plane.tolerance; }) &&
-           (!label || labels.label(p) == *label);
-  }
-};
-
-using Corner = std::array<double, 3>;  // barycentric, on a face
-using Triangle = std::array<Corner, 3>;
-
-Corner between(const Corner& a, const Corner& b, double t) {
-  return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])};
-}
-
-/// What is left of a polygon where a linear function (given at the face's corners) is at most 0 (Sutherland and Hodgman
-/// 1974).
-std::vector<Corner> clipped(const std::vector<Corner>& polygon, const Corner& value) {
-  const auto at = [&](const Corner& c) { return c[0] * value[0] + c[1] * value[1] + c[2] * value[2]; };
-  std::vector<Corner> rest;
-  for (std::size_t i = 0; i < polygon.size(); ++i) {
-    const Corner &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
-    const double va = at(a), vb = at(b);
-    if (va <= 0) rest.push_back(a);
-    if ((va < 0 && vb > 0) || (va > 0 && vb < 0)) rest.push_back(between(a, b, va / (va - vb)));
-  }
-  return rest;
-}
-
-/// Calls visit(face, normal, triangle, area_mm2) for triangles that cover the part of each face that lies in the
-/// region: exactly between planes; a label is asked for sixteen pieces of each.
 template <class Visit>
 void cover(const TetMesh& mesh, const std::vector<TetFace>& faces, const Region& region, const LoadSetting& setting,
            const Visit& visit) {
-  constexpr std::size_t pieces_along = 4;
-  for (const TetFace& face : faces) {
-    const std::array<Vec3d, 3> p{mesh.nodes[face.nodes[0]], mesh.nodes[face.nodes[1]], mesh.nodes[face.nodes[2]]};
-    const Vec3d double_area = cross(p[1] - p[0], p[2] - p[0]);
-    const double area = 0.5 * norm(double_area);
-    if (!(area > 0)) continue;
-    const Vec3d normal = normalized(double_area);
-    std::vector<Corner> polygon{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    for (const Plane& plane : region.planes) {
-      // The surface may lie that much off along its own normal; planes across it have nothing to forgive.
-      const double limit = plane.offset + plane.tolerance * std::abs(dot(normal, plane.normal));
-      Corner value{};
-      for (std::size_t k = 0; k < 3; ++k) value[k] = dot(p[k], plane.normal) - limit;
-      polygon = clipped(polygon, value);
-      if (polygon.size() < 3) break;
-    }
-    const auto place = [&](const Corner& c) { return c[0] * p[0] + c[1] * p[1] + c[2] * p[2]; };
-    const auto give = [&](const Triangle& t) {
-      const double share =
-          std::abs((t[1][1] - t[0][1]) * (t[2][2] - t[0][2]) - (t[2][1] - t[0][1]) * (t[1][2] - t[0][2]));
-      if (share > 0) visit(face, normal, t, share * area);
-    };
-    for (std::size_t i = 2; i < polygon.size(); ++i) {
-      const Triangle whole{polygon[0], polygon[i - 1], polygon[i]};
-      if (!region.label) {
-        give(whole);
-        continue;
-      }
-      const auto corner = [&](std::size_t u, std::size_t v) {
-        const double step = 1.0 / pieces_along;
-        const double s = step * static_cast<double>(u), t = step * static_cast<double>(v);
-        Corner c{};
-        for (std::size_t k = 0; k < 3; ++k) c[k] = (1 - s - t) * whole[0][k] + s * whole[1][k] + t * whole[2][k];
-        return c;
-      };
-      const auto ask = [&](const Triangle& piece) {
-        Corner middle{};
-        for (std::size_t k = 0; k < 3; ++k) middle[k] = (piece[0][k] + piece[1][k] + piece[2][k]) / 3;
-        // Asked below the surface: a cut that runs in the surface itself would answer at random.
-        if (setting.labels.label(place(middle) - setting.tolerance_mm * normal) == *region.label) give(piece);
-      };
-      for (std::size_t u = 0; u < pieces_along; ++u) {
-        for (std::size_t v = 0; u + v < pieces_along; ++v) {
-          ask({corner(u, v), corner(u + 1, v), corner(u, v + 1)});
-          if (u + v + 1 < pieces_along) ask({corner(u + 1, v + 1), corner(u, v + 1), corner(u + 1, v)});
-        }
-      }
-    }
-  }
+  cover(mesh, faces, region, setting.labels, setting.tolerance_mm, visit);
 }
 
 /// A constant traction on a triangle of a face: the rule of three edge middles is exact for six-node faces.
-void spread(std::vector<Vec3d>& force_n, const TetFace& face, const Triangle& t, Vec3d total_n) {
+void spread(std::vector<Vec3d>& force_n, const TetFace& face, const CornerTriangle& t, Vec3d total_n) {
   for (std::size_t k = 0; k < 3; ++k) {
     const auto n = fem::face_shape_functions(between(t[k], t[(k + 1) % 3], 0.5));
     for (std::size_t i = 0; i < 6; ++i) force_n[face.nodes[i]] = force_n[face.nodes[i]] + (n[i] / 3) * total_n;
@@ -166,7 +77,7 @@ Region resolved(const Selection& where, const TetMesh& body, const LoadSetting& 
 using Held = std::vector<std::array<bool, 3>>;
 
 /// Do the held components stop all six rigid motions?
-bool is_held(const TetMesh& mesh, const Held& held) {
+bool is_held(const TetMesh& mesh, const Frame& frame, const Held& held) {
   Box3d box;
   for (const Vec3d& p : mesh.nodes) box.include(p);
   Eigen::Matrix<double, 6, 6> stops = Eigen::Matrix<double, 6, 6>::Zero();
@@ -174,7 +85,7 @@ bool is_held(const TetMesh& mesh, const Held& held) {
     const Vec3d arm = (2 / box.longest_side()) * (mesh.nodes[node] - box.center());
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!held[node][axis]) continue;
-      const Vec3d unit{axis == 0 ? 1.0 : 0.0, axis == 1 ? 1.0 : 0.0, axis == 2 ? 1.0 : 0.0};
+      const Vec3d unit = axis == 0 ? frame.x : axis == 1 ? frame.y : frame.z;
       const Vec3d turn = cross(arm, unit);
       Eigen::Matrix<double, 6, 1> row;
       row << unit.x, unit.y, unit.z, turn.x, turn.y, turn.z;
@@ -198,7 +109,7 @@ void hold(Held& held, const Hold& h, const TetMesh& mesh, const LoadSetting& set
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node)
     if (h.region.contains(mesh.nodes[node], setting.labels)) add(node);
   if (!h.by_face) return;
-  cover(mesh, boundary(mesh), h.region, setting, [&](const TetFace& face, Vec3d, const Triangle&, double) {
+  cover(mesh, boundary(mesh), h.region, setting, [&](const TetFace& face, Vec3d, const CornerTriangle&, double) {
     for (const std::uint32_t node : face.nodes) add(node);
   });
 }
@@ -233,12 +144,12 @@ struct Put {
   std::vector<Vec3d>& force_n;
 
   void operator()(const Traction& a) const {
-    cover(mesh, faces, a.region, setting, [&](const TetFace& face, Vec3d, const Triangle& t, double area) {
+    cover(mesh, faces, a.region, setting, [&](const TetFace& face, Vec3d, const CornerTriangle& t, double area) {
       spread(force_n, face, t, area * a.n_per_mm2);
     });
   }
   void operator()(const Push& a) const {
-    cover(mesh, faces, a.region, setting, [&](const TetFace& face, Vec3d normal, const Triangle& t, double area) {
+    cover(mesh, faces, a.region, setting, [&](const TetFace& face, Vec3d normal, const CornerTriangle& t, double area) {
       spread(force_n, face, t, (-a.mpa * area) * normal);
     });
   }
@@ -267,6 +178,7 @@ std::string place_text(Vec3d p) {
 
 struct AppliedLoad::Impl {
   LoadSetting setting;
+  Frame frame{};  // whose axes the holds speak of
   std::vector<Hold> holds;
   std::vector<Action> actions;
   double magnitude_n = 0;
@@ -323,19 +235,37 @@ struct Finder {
     out.selected.push_back(found);
   }
 
+  /// The frame in which every sliding support slides across an axis: the mesh's own if it will do.
+  Frame slides() const {
+    std::vector<Vec3d> across;
+    const auto along_axis = [](Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) > 1 - 1e-9; };
+    for (const Support& support : load.supports)
+      if (support.sliding) across.push_back(resolved(*support.sliding, out.setting));
+    if (std::all_of(across.begin(), across.end(), along_axis)) return {};
+    Frame frame = frame_along({}, across.front());
+    for (const Vec3d& v : across) {
+      if (std::abs(dot(v, frame.z)) > 1e-6) continue;
+      frame.x = normalized(v - dot(v, frame.z) * frame.z);
+      frame.y = cross(frame.z, frame.x);
+      break;
+    }
+    return frame;
+  }
+  std::array<bool, 3> axes_along(Vec3d v, const std::string& at) const {
+    const std::array<bool, 3> axes{std::abs(dot(v, out.frame.x)) > 1 - 1e-9, std::abs(dot(v, out.frame.y)) > 1 - 1e-9,
+                                   std::abs(dot(v, out.frame.z)) > 1 - 1e-9};
+    if (!axes[0] && !axes[1] && !axes[2])
+      refuse("slides across directions that are neither parallel nor at right angles", at, "turn one of them");
+    return axes;
+  }
+
   void support(const Support& support, const std::string& at) const {
     Hold h{region(support.where, at), {true, true, true}};
-    if (support.sliding) {
-      const Vec3d along = resolved(*support.sliding, out.setting);
-      for (int axis = 0; axis < 3; ++axis) h.axes[static_cast<std::size_t>(axis)] = std::abs(along[axis]) > 1 - 1e-9;
-      if (!h.axes[0] && !h.axes[1] && !h.axes[2])
-        refuse("slides across a direction that is no axis of the model as it stands", at + ".sliding",
-               "use up, or an axis level with it that verify.azimuth_deg points along or across");
-    }
+    if (support.sliding) h.axes = axes_along(resolved(*support.sliding, out.setting), at + ".sliding");
     static_cast<void>(area(h.region, at + ".where"));
     Held alone(body.nodes.size(), {false, false, false});
     hold(alone, {h.region, {true, true, true}}, body, out.setting);
-    h.by_face = !is_held(body, alone);
+    h.by_face = !is_held(body, out.frame, alone);
     out.holds.push_back(std::move(h));
   }
 
@@ -378,6 +308,7 @@ struct Finder {
 AppliedLoad::Impl::Impl(const LoadCase& load, const std::string& key, const TetMesh& body, const LoadSetting& given)
     : setting(given) {
   const Finder find(*this, load, body);
+  frame = find.slides();
   const auto indexed = [&](const char* list, std::size_t i) {
     return key + "." + list + "[" + std::to_string(i) + "]";
   };
@@ -387,7 +318,7 @@ AppliedLoad::Impl::Impl(const LoadCase& load, const std::string& key, const TetM
 
   Held held(body.nodes.size(), {false, false, false});
   for (const Hold& h : holds) hold(held, h, body, setting);
-  if (!is_held(body, held)) {
+  if (!is_held(body, frame, held)) {
     double area = 0;
     for (std::size_t i = 0; i < holds.size(); ++i) area += selected[i].area_mm2;
     find.refuse("leaves the body free to move: it is held on " + area_text(area) + " alone", key + ".supports",
@@ -414,6 +345,7 @@ std::vector<std::array<bool, 3>> AppliedLoad::held(const TetMesh& mesh) const {
   return held;
 }
 
+const Frame& AppliedLoad::held_in() const { return impl_->frame; }
 double AppliedLoad::magnitude_n() const { return impl_->magnitude_n; }
 const std::vector<Selected>& AppliedLoad::selected() const { return impl_->selected; }
 

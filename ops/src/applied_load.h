@@ -38,9 +38,9 @@ class AppliedLoad {
  public:
   struct Impl;
   /// `cases[index]`, already checked, in the coordinates of `body`.
-  /// @throws Error BadRecipe: a selection is empty, a label does not exist, the supports leave the body free to move, a
-  /// sliding support does not lie along an axis of the mesh's frame; each names the case, the key and the size of what
-  /// was selected. Cost: O(faces + nodes) per selection.
+  /// @throws Error BadRecipe: a selection is empty, a label does not exist, the supports leave the body free to move,
+  /// the directions of its sliding supports are neither parallel nor at right angles; each names the case, the key and
+  /// the size of what was selected. Cost: O(faces + nodes) per selection.
   AppliedLoad(const std::vector<LoadCase>& cases, std::size_t index, const TetMesh& body, const LoadSetting& setting);
 
   /// Consistent forces on the nodes of `mesh`, N. Tractions are integrated exactly over straight-sided faces, also
@@ -48,7 +48,9 @@ class AppliedLoad {
   /// to the eye): its shares are those of the whole body. Cost: O(faces + nodes) per force.
   [[nodiscard]] std::vector<Vec3d> forces_n(const TetMesh& mesh,
                                             const std::function<bool(Vec3d p, Vec3d to_eye)>& mine) const;
-  /// Which components of each node of `mesh` are held.
+  /// The axes that held() speaks of; the mesh's own unless a sliding support lies askew to them.
+  [[nodiscard]] const Frame& held_in() const;
+  /// Which components of each node of `mesh`, along the axes of held_in(), are held.
   [[nodiscard]] std::vector<std::array<bool, 3>> held(const TetMesh& mesh) const;
   /// Sum of the magnitudes of its forces on the body, N.
   [[nodiscard]] double magnitude_n() const;

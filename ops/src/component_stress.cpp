@@ -43,7 +43,7 @@ double MeanStress::dominance() const {
 }
 
 ComponentSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
-                      const std::vector<std::uint32_t>& tets, const Material& material) {
+                         const std::vector<std::uint32_t>& tets, const Material& material) {
   ComponentSummary result{};
   std::vector<std::pair<double, double>> by_stress;  // von Mises, volume
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();

@@ -89,6 +89,11 @@ Json to_json(const SolidReport& solid) {
           {"voxel_mm", solid.voxel_mm}};
 }
 
+Json to_json(const Selected& selected) {
+  return {
+      {"key", selected.key}, {"case", selected.load_case}, {"area_mm2", selected.area_mm2}, {"faces", selected.faces}};
+}
+
 Json to_json(const MeshCheck& mesh) {
   return {{"volume_mm3", mesh.volume_mm3},
           {"triangles", mesh.triangles},
@@ -174,7 +179,8 @@ std::string to_json(const Report& report) {
        {{"tets", report.verification.tets},
         {"dof", report.verification.dof},
         {"residual", report.verification.residual},
-        {"equilibrium", report.verification.equilibrium}}},
+        {"equilibrium", report.verification.equilibrium},
+        {"selected", array(report.verification.selected)}}},
       {"parts", array(report.parts)},
       {"interfaces", array(report.interfaces)},
       {"solid", to_json(report.solid)},

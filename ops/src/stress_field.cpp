@@ -8,6 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "fibrolite/error.h"
 #include "fibrolite/file.h"
 #include "fibrolite/vtu.h"
 
@@ -71,6 +72,16 @@ class Deck {
   std::string buffer_;
 };
 
+/// A node held fast is so in any frame; one that slides only along the deck's own axes.
+void check_axes(const StressField& field, const StressField::Case& load) {
+  if (load.held_in.x == Vec3d{1, 0, 0} && load.held_in.y == Vec3d{0, 1, 0}) return;
+  std::vector<int> axes(field.mesh.nodes.size(), 0);
+  for (const StressField::Fixed& f : load.fixed) ++axes[f.node];
+  if (std::any_of(axes.begin(), axes.end(), [](int n) { return n == 1 || n == 2; }))
+    throw Error(Code::Unsupported, "a support slides askew to the deck's axes", load.name,
+                "turn the model so that it stands along x, y or z, or hold it fast");
+}
+
 }  // namespace
 
 void write_vtu(const std::filesystem::path& path, const StressField& field, const Context& context) {
@@ -130,6 +141,7 @@ void write_inp(const std::filesystem::path& path, const StressField& field, cons
     deck.row("** load case: " + load.name);
     deck.row("*STEP");
     deck.row("*STATIC");
+    check_axes(field, load);
     deck.row("*BOUNDARY", "OP=NEW");
     for (const StressField::Fixed& f : load.fixed) deck.row(f.node + 1, f.axis + 1, f.axis + 1);
     deck.row("*CLOAD", "OP=NEW");

@@ -20,6 +20,7 @@
 #include "fibrolite/ops/text.h"
 #include "locate.h"
 #include "part_maker.h"
+#include "solve_cases.h"
 #include "voxel_tets.h"
 
 namespace fibrolite {
@@ -46,15 +47,9 @@ struct Setting {
   std::vector<AppliedLoad> loads;  // the same, found on the body
 };
 
-/// A mesh under every load case.
-struct Loaded {
-  std::vector<std::vector<fem::Fixed>> fixed;
-  std::vector<fem::LoadCase> cases;
-};
-
 struct Model {
   TetMesh mesh;
-  Loaded loaded;
+  std::vector<HeldCase> cases;
   std::vector<fem::Solution> solutions;  // one per load case
 };
 
@@ -79,41 +74,20 @@ struct Whole {
   const fem::Locator locator;
 };
 
-/// Cases that hold the same components share one factorisation.
-std::vector<fem::Solution> solve_all(const TetMesh& mesh, const Material& material, const Loaded& loaded,
-                                     const Context& context) {
-  std::vector<fem::Solution> solutions(loaded.cases.size());
-  std::vector<bool> solved(loaded.cases.size(), false);
-  for (std::size_t first = 0; first < solved.size(); ++first) {
-    if (solved[first]) continue;
-    std::vector<std::size_t> group;
-    std::vector<fem::LoadCase> cases;
-    for (std::size_t c = first; c < solved.size(); ++c) {
-      if (solved[c] || loaded.fixed[c] != loaded.fixed[first]) continue;
-      group.push_back(c);
-      cases.push_back(loaded.cases[c]);
-      solved[c] = true;
-    }
-    auto some = fem::solve(mesh, material, loaded.fixed[first], cases, context);
-    for (std::size_t i = 0; i < group.size(); ++i) solutions[group[i]] = std::move(some[i]);
-  }
-  return solutions;
-}
-
 /// Stage 1: the whole body on a coarse mesh.
 Model solve_body(TetMesh mesh, Setting& setting, const LoadSetting& how, const Context& context) {
-  Loaded loaded;
+  std::vector<HeldCase> cases;
   for (std::size_t c = 0; c < setting.cases.size(); ++c) {
     const AppliedLoad& load = setting.loads.emplace_back(setting.cases, c, mesh, how);
-    loaded.cases.push_back({load.forces_n(mesh, [](Vec3d, Vec3d) { return true; }), {}});
-    auto& fixed = loaded.fixed.emplace_back();
-    const auto held = load.held(mesh);
-    for (std::uint32_t node = 0; node < held.size(); ++node)
+    HeldCase& held =
+        cases.emplace_back(HeldCase{load.held_in(), {}, {load.forces_n(mesh, [](Vec3d, Vec3d) { return true; }), {}}});
+    const auto own = load.held(mesh);
+    for (std::uint32_t node = 0; node < own.size(); ++node)
       for (int axis = 0; axis < 3; ++axis)
-        if (held[node][static_cast<std::size_t>(axis)]) fixed.push_back({node, axis});
+        if (own[node][static_cast<std::size_t>(axis)]) held.fixed.push_back({node, axis});
   }
-  auto solutions = solve_all(mesh, setting.material, loaded, context);
-  return {std::move(mesh), std::move(loaded), std::move(solutions)};
+  auto solutions = solve_cases(mesh, setting.material, cases, context);
+  return {std::move(mesh), std::move(cases), std::move(solutions)};
 }
 
 /// Stage 2: a candidate on its own mesh. On its cut faces it follows the body's coarse displacements.
@@ -127,33 +101,35 @@ Model solve_component(TetMesh mesh, const Model& body, const fem::Locator& locat
       on_cut[node] = static_cast<double>(distance[node]) > -setting.voxel_mm;
     }
   }
-  Loaded loaded;
+  std::vector<HeldCase> cases;
   for (std::size_t c = 0; c < setting.loads.size(); ++c) {
     const AppliedLoad& load = setting.loads[c];
     // Asked a voxel below the surface: a cut that runs in the surface itself would give the points to either side at
     // random. Other forces need no such question: what falls on a cut acts on nodes that are prescribed.
-    loaded.cases.push_back(
-        {load.forces_n(
-             mesh, [&](Vec3d p, Vec3d to_eye) { return partition.labels.label(p - setting.voxel_mm * to_eye) == id; }),
-         {}});
-    auto& fixed = loaded.fixed.emplace_back();
-    const auto held = load.held(mesh);
+    const auto mine = [&](Vec3d p, Vec3d to_eye) {
+      return partition.labels.label(p - setting.voxel_mm * to_eye) == id;
+    };
+    const Frame& frame = load.held_in();
+    HeldCase& held = cases.emplace_back(HeldCase{frame, {}, {load.forces_n(mesh, mine), {}}});
+    const auto own = load.held(mesh);
     for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
-      const auto& own = held[node];
-      if (!on_cut[node] && !own[0] && !own[1] && !own[2]) continue;
-      const bool fast = own[0] && own[1] && own[2];
-      const Vec3d u =
-          fast || !on_cut[node] ? Vec3d{} : locator.interpolate(body.solutions[c].displacement_mm, mesh.nodes[node]);
+      const auto& axes = own[node];
+      if (!on_cut[node] && !axes[0] && !axes[1] && !axes[2]) continue;
+      Vec3d u{};  // a support is stronger than a cut
+      if (on_cut[node] && !(axes[0] && axes[1] && axes[2])) {
+        const Vec3d v = locator.interpolate(body.solutions[c].displacement_mm, mesh.nodes[node]);
+        u = {dot(v, frame.x), dot(v, frame.y), dot(v, frame.z)};
+      }
       for (int axis = 0; axis < 3; ++axis) {
-        const bool mine = own[static_cast<std::size_t>(axis)];
-        if (!mine && !on_cut[node]) continue;
-        fixed.push_back({node, axis});
-        loaded.cases[c].fixed_mm.push_back(mine ? 0 : u[axis]);
+        const bool supported = axes[static_cast<std::size_t>(axis)];
+        if (!supported && !on_cut[node]) continue;
+        held.fixed.push_back({node, axis});
+        held.load.fixed_mm.push_back(supported ? 0 : u[axis]);
       }
     }
   }
-  auto solutions = solve_all(mesh, setting.material, loaded, context);
-  return {std::move(mesh), std::move(loaded), std::move(solutions)};
+  auto solutions = solve_cases(mesh, setting.material, cases, context);
+  return {std::move(mesh), std::move(cases), std::move(solutions)};
 }
 
 std::vector<std::uint32_t> all_tets(const TetMesh& mesh) {
@@ -328,8 +304,9 @@ StressField stress_field(const Model& body, const Setting& setting, const Labels
     const std::vector<Vec3d>& displacement = body.solutions[c].displacement_mm;
     StressField::Case& solved = field.cases.emplace_back();
     solved.name = setting.cases[c].name;
-    for (const fem::Fixed& f : body.loaded.fixed[c]) solved.fixed.push_back({f.node, f.axis});
-    solved.force_n = body.loaded.cases[c].force_n;
+    solved.held_in = body.cases[c].frame;
+    for (const fem::Fixed& f : body.cases[c].fixed) solved.fixed.push_back({f.node, f.axis});
+    solved.force_n = body.cases[c].load.force_n;
     solved.displacement_mm = displacement;
     solved.stress_mpa = fem::nodal_stress(body.mesh, setting.material, displacement);
   }

@@ -185,6 +185,14 @@ TEST_F(BadInput, UnknownRecipeKeys) {
   EXPECT_THAT(refused_option({"--recipe", model("r.json", R"({"mfs": {"wal_mm": 1}})")}, BadRecipe),
               AllOf(HasSubstr("did you mean mfs.wall_mm?"), HasSubstr("r.json")));
 }
+TEST_F(BadInput, LoadsAndMaterials) {
+  EXPECT_THAT(refused_option({"--set", "loads=stnad"}, BadRecipe), HasSubstr("did you mean stand?"));
+  EXPECT_THAT(refused_option({"--set", "material=PETF"}, BadRecipe), HasSubstr("did you mean PETG?"));
+  EXPECT_THAT(
+      refused_option({"--recipe", model("r.json", R"({"loads": [{"name": "a", "supports": [], "forces": []}]})")},
+                     BadRecipe),
+      HasSubstr("load case 'a' has no support"));
+}
 TEST_F(BadInput, RecipesThatAreNone) {
   refused_option({"--recipe", model("r.json", "{")}, BadRecipe);
   refused_option({"--recipe", model("r.json", "")}, BadRecipe);

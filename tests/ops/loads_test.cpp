@@ -14,6 +14,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "models.h"
+#include "solve_cases.h"
 
 namespace fibrolite {
 namespace {
@@ -271,8 +272,41 @@ TEST(Loads, WhatLeavesTheBodyFreeSaysSo) {
     const Vec3d p = box_mesh().nodes[node];
     EXPECT_EQ(held[node], (std::array{p.x <= 1, p.y <= 1.5, p.z <= 2}));
   }
-  load.supports[2].sliding = along({1, 1, 0});
+  load.supports[2].sliding = along({1, 2, 0});
   EXPECT_THAT(refusal([&] { static_cast<void>(applied(load)); }), HasSubstr("supports[2].sliding"));
+}
+
+/// A block on a wedge: held across planes that lie askew to its mesh, it is compressed as if it stood on a table.
+TEST(Loads, SupportsSlideOnPlanesThatLieAskew) {
+  const Frame frame = frame_along({1, 2, 3}, {2, -1, 4});
+  const auto world = [&](Vec3d v) { return v.x * frame.x + v.y * frame.y + v.z * frame.z; };
+  TetMesh mesh = box_mesh();
+  for (Vec3d& p : mesh.nodes) p = frame.to_world(p);
+  LoadCase load{"askew", {}, {}};
+  for (const Vec3d axis : {Vec3d{0, 0, 1}, Vec3d{1, 0, 0}, Vec3d{0, 1, 0}})
+    load.supports.push_back({lowest(0.01, along(world(axis))), along(world(axis))});
+  Pressure pressure{.mpa = 5};
+  pressure.where.highest = EndShare{1e-6, along(frame.z)};
+  load.forces = {pressure};
+  const AppliedLoad found{{load}, 0, mesh, {}};
+  HeldCase held{found.held_in(), {}, {found.forces_n(mesh, [](Vec3d, Vec3d) { return true; }), {}}};
+  const auto axes = found.held(mesh);
+  for (std::uint32_t node = 0; node < axes.size(); ++node)
+    for (int axis = 0; axis < 3; ++axis)
+      if (axes[node][static_cast<std::size_t>(axis)]) held.fixed.push_back({node, axis});
+  const Material pla;
+  const auto solution = solve_cases(mesh, pla, {held}, {}).front();
+  // Uniform: -5 MPa along the block's height, free to widen.
+  for (const fem::Stress& s : solution.centroid_stress) {
+    EXPECT_NEAR(fem::normal_stress(s, frame.z), -5, 1e-4);
+    EXPECT_NEAR(fem::von_mises(s), 5, 1e-4);
+  }
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    const Vec3d p = box_mesh().nodes[node];
+    const Vec3d u = 5 / pla.young_mpa * Vec3d{pla.poisson * p.x, pla.poisson * p.y, -p.z};
+    EXPECT_LT(norm(solution.displacement_mm[node] - world(u)), 1e-5);
+  }
+  EXPECT_LT(norm(solution.imbalance_n), 1e-6);
 }
 
 TEST(Loads, BadCasesAreRefusedBeforeThereIsABody) {

@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "fibrolite/error.h"
@@ -181,6 +184,121 @@ TEST(Set, RefusesWhatIsNoAssignment) {
   EXPECT_THAT(refusal_of_set("tcs.cell_mm"), HasSubstr("no value"));
   EXPECT_THAT(refusal_of_set("tcs=5"), HasSubstr("one of its keys"));
   EXPECT_NE(refusal_of_set("=5"), "");
+}
+
+/// Every selector, every kind of force.
+constexpr const char* all_loads = R"({"loads": [
+  {"name": "clamp",
+   "supports": [{"where": {"lowest": {"share": 0.1, "along": [0, 1, 0]}}},
+                {"where": {"half_space": {"point_mm": [1, 2, 3], "normal": [0, 0, -1]}}, "sliding": "up"}],
+   "forces": [{"force_n": 110, "direction": [0.3, 0, -1],
+               "where": {"seen_from": "up", "box_mm": [[0, 0, 0], [9, 9, 9]]}},
+              {"pressure_mpa": 0.25, "where": {"highest": {"share": 0.5}, "label": 2}},
+              {"gravity": "down"}]},
+  {"name": "push",
+   "supports": [{"where": {"lowest": {}}}],
+   "forces": [{"force_n": 5, "direction": "slanted", "where": {"half_space": [
+      {"point_mm": [0, 0, 0], "normal": [1, 0, 0]}, {"point_mm": [0.1, 0, 0], "normal": [-1, 0, 0]}]}}]}]})";
+
+TEST(Loads, AreReadAndPrintedWhole) {
+  const Recipe recipe = parse_recipe(all_loads, Recipe{}, "x");
+  ASSERT_EQ(recipe.loads.size(), 2U);
+  const LoadCase& clamp = recipe.loads[0];
+  EXPECT_EQ(clamp.name, "clamp");
+  ASSERT_EQ(clamp.supports.size(), 2U);
+  EXPECT_EQ(clamp.supports[0].where.lowest->share, 0.1);
+  EXPECT_EQ(clamp.supports[0].where.lowest->along.vector, (Vec3d{0, 1, 0}));
+  EXPECT_FALSE(clamp.supports[0].sliding.has_value());
+  EXPECT_EQ(clamp.supports[1].where.half_spaces.at(0).normal, (Vec3d{0, 0, -1}));
+  EXPECT_EQ(clamp.supports[1].sliding->of, Direction::Of::Up);
+  ASSERT_EQ(clamp.forces.size(), 3U);
+  const auto& total = std::get<TotalForce>(clamp.forces[0]);
+  EXPECT_EQ(total.newton, 110);
+  EXPECT_EQ(total.direction.vector, (Vec3d{0.3, 0, -1}));
+  EXPECT_EQ(total.where.seen_from->of, Direction::Of::Up);
+  EXPECT_EQ(total.where.box_mm->max, (Vec3d{9, 9, 9}));
+  EXPECT_EQ(std::get<Pressure>(clamp.forces[1]).mpa, 0.25);
+  EXPECT_EQ(std::get<Pressure>(clamp.forces[1]).where.label, 2);
+  EXPECT_EQ(std::get<Gravity>(clamp.forces[2]).direction.of, Direction::Of::Down);
+  EXPECT_EQ(recipe.loads[1].supports[0].where.lowest->share, 0.05);
+  EXPECT_EQ(std::get<TotalForce>(recipe.loads[1].forces[0]).where.half_spaces.size(), 2U);
+
+  const std::string printed = to_json(recipe);
+  EXPECT_EQ(to_json(parse_recipe(printed, Recipe{}, "printed")), printed);
+  EXPECT_EQ(to_json(parse_recipe(R"({"loads": "paper-verify"})", recipe, "x")), to_json(Recipe{}));
+}
+
+TEST(Loads, ByNameAndBySet) {
+  EXPECT_EQ(set(Recipe{}, "loads=stand").loads.size(), 1U);
+  EXPECT_EQ(std::get<TotalForce>(set(Recipe{}, "loads=paper-compare").loads.at(0).forces.at(0)).newton, 110);
+  EXPECT_TRUE(set(set(Recipe{}, "loads=stand"), "loads=paper-verify").loads.empty());
+  EXPECT_EQ(
+      set(Recipe{}, R"(loads=[{"name": "a", "supports": [{"where": {"lowest": {}}}], "forces": [{"gravity": "up"}]}])")
+          .loads.size(),
+      1U);
+  EXPECT_THAT(refusal_of_set("loads=paper-compar"), HasSubstr("did you mean paper-compare?"));
+}
+
+TEST(Loads, MistakesNameThePlaceAndTheNearestKey) {
+  const auto with = [](const std::string& supports, const std::string& forces) {
+    return refusal_of(R"({"loads": [{"name": "a", "supports": )" + supports + R"(, "forces": )" + forces + "}]}");
+  };
+  const std::string foot = R"([{"where": {"lowest": {}}}])", weight = R"([{"gravity": "down"}])";
+  EXPECT_EQ(with(foot, weight), "");
+  EXPECT_THAT(with("[]", weight), AllOf(HasSubstr("load case 'a' has no support"), HasSubstr("loads[0].supports")));
+  EXPECT_THAT(with(foot, "[]"), HasSubstr("load case 'a' has no force"));
+  EXPECT_THAT(with(R"([{"where": {}}])", weight), HasSubstr("selects by nothing"));
+  EXPECT_THAT(with(R"([{"where": {"lowst": {}}}])", weight),
+              AllOf(HasSubstr("unknown key loads[0].supports[0].where.lowst"), HasSubstr("did you mean lowest?"),
+                    HasSubstr("mine.json")));
+  EXPECT_THAT(with(foot, R"([{"force": 3}])"), HasSubstr("did you mean force_n?"));
+  EXPECT_THAT(with(foot, R"([{"presure_mpa": 3}])"), HasSubstr("did you mean pressure_mpa?"));
+  EXPECT_THAT(with(foot, R"([{"direction": "down"}])"), HasSubstr("force_n, pressure_mpa or gravity"));
+  EXPECT_THAT(with(foot, R"([{"gravity": "down", "force_n": 1}])"), HasSubstr("one of"));
+  EXPECT_THAT(with(foot, R"([{"gravity": "left"}])"), AllOf(HasSubstr("forces[0].gravity"), HasSubstr("slanted")));
+  EXPECT_THAT(with(foot, R"([{"gravity": [0, 0, 0]}])"), HasSubstr("without length"));
+  EXPECT_THAT(with(foot, R"([{"force_n": "1", "where": {"lowest": {}}}])"), HasSubstr("forces[0].force_n"));
+  EXPECT_THAT(with(foot, R"([{"pressure_mpa": 1, "where": {"box_mm": [[0, 0, 0]]}}])"), HasSubstr("box_mm"));
+  EXPECT_THAT(with(foot, R"([{"pressure_mpa": 1, "where": {"label": -1}}])"), HasSubstr("where.label"));
+  EXPECT_THAT(with(R"({"where": 1})", weight), HasSubstr("loads[0].supports cannot be"));
+  EXPECT_THAT(refusal_of(R"({"loads": 5})"), HasSubstr("loads cannot be 5"));
+  EXPECT_THAT(refusal_of(R"({"loads": []})"), HasSubstr("loads cannot be []"));
+  EXPECT_THAT(refusal_of(R"({"loads": [{"nam": "a"}]})"), HasSubstr("did you mean name?"));
+}
+
+TEST(Materials, ByNameAndByNumber) {
+  EXPECT_EQ(parse_recipe(R"({"material": "PETG"})", Recipe{}, "x").material, material("PETG"));
+  EXPECT_EQ(set(Recipe{}, "material=AlSi10Mg").material, material("AlSi10Mg"));
+  EXPECT_EQ(parse_recipe(R"({"material": {"yield_mpa": 40}})", set(Recipe{}, "material=PETG"), "x").material.young_mpa,
+            material("PETG").young_mpa);
+  EXPECT_THAT(refusal_of(R"({"material": "PEGT"})"), HasSubstr("did you mean PETG?"));
+  EXPECT_THAT(refusal_of_set("material=steel"), HasSubstr("no material is called 'steel'"));
+  EXPECT_NE(refusal_of(R"({"material": 5})"), "");
+  EXPECT_THAT(refusal_of(R"({"material": {"density_g_cm3": 0}})"), HasSubstr("material.density_g_cm3"));
+  EXPECT_THAT(refusal_of(R"({"material": {"yield_mpa": -1}})"), HasSubstr("material.yield_mpa"));
+}
+
+/// docs/loads.md promises: its examples are recipes, its table is the one in the code.
+TEST(Loads, ThePageAboutThemHolds) {
+  std::ifstream in(std::filesystem::path(FIBROLITE_ASSETS).parent_path() / "docs" / "loads.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  int examples = 0;
+  const std::string fence = "```json\n";
+  for (std::size_t at = page.find(fence); at != std::string::npos; at = page.find(fence, at + 1), ++examples) {
+    const std::size_t begin = at + fence.size();
+    EXPECT_EQ(refusal_of(page.substr(begin, page.find("```", begin) - begin)), "");
+  }
+  EXPECT_EQ(examples, 2);
+  for (const NamedMaterial& row : materials()) {
+    const Material& m = row.material;
+    const std::string numbers = " | " + number_text(m.density_g_cm3) + " | " + number_text(m.young_mpa) + " | ";
+    const auto at = page.find("| `" + row.name + "`");
+    ASSERT_NE(at, std::string::npos) << row.name;
+    const std::string line = page.substr(at, page.find('\n', at) - at);
+    EXPECT_THAT(line, HasSubstr(numbers));
+    EXPECT_THAT(line, HasSubstr(" | " + number_text(m.yield_mpa) + " | "));
+    EXPECT_NEAR(std::stod(line.substr(line.find(numbers) + numbers.size())), m.poisson, 1e-12);
+  }
 }
 
 TEST(CheckRecipe, TwoVoxelsIsTheLimit) {

@@ -40,6 +40,7 @@ Report filled() {
   interface.regions_after = 1;
   interface.columns = 4;
   report.interfaces = {interface};
+  report.verification.selected = {{"loads[0].forces[0].where", "pressed", 12.5, 7}};
   report.solid.pieces = 1;
   report.solid.voxel_mm = 0.25;
   report.mesh.triangles = 99;
@@ -78,6 +79,8 @@ TEST(Report, ShapesOfValues) {
   EXPECT_EQ(report["parts"][0]["mean_stress_mpa"]["axial"], -5.0);
   EXPECT_EQ(report["parts"][0]["mean_stress_mpa"]["transverse"], json({0.5, 0.25}));
   EXPECT_EQ(report["interfaces"][0]["parts"], json({3, 0}));
+  EXPECT_EQ(report["verification"]["selected"][0]["case"], "pressed");
+  EXPECT_EQ(report["verification"]["selected"][0]["area_mm2"], 12.5);
   EXPECT_EQ(report["solid"]["voxel_mm"], 0.25);
   EXPECT_EQ(json::parse(to_json(Report{}))["parts"], json::array());
 }

@@ -152,6 +152,7 @@ TEST(Vtu, stresses_and_displacements_turn_into_the_world) {
   field.cases.push_back({"pull",
                          {},
                          {},
+                         {},
                          std::vector<Vec3d>(10, Vec3d{0, 0, 2}),
                          std::vector<StressTensor>(10, StressTensor{0, 0, 9, 1, 2, 3})});
   write_vtu(folder / "a.vtu", field);

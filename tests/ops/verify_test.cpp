@@ -11,6 +11,7 @@
 
 #include "component_stress.h"
 #include "fibrolite/error.h"
+#include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
@@ -176,6 +177,132 @@ TEST(Verify, TheFemDecidesNotTheShape) {
   VerifyParams paper{.triangles = triangles};
   paper.world_axes = true;  // x, y, z know nothing of the axis: z dominates
   EXPECT_EQ(verify(model.proxy, model.partition, paper).parts.parts.size(), 2U);
+}
+
+TEST(Verify, TheBuiltInCasesCanBeStated) {
+  const CylinderOnBox model;
+  Support foot;
+  foot.where.lowest = EndShare{.share = 0.05};
+  TotalForce force{.newton = 1000};
+  force.where.seen_from = Direction{Direction::Of::Up, {}};
+  TotalForce slanted = force;
+  slanted.direction = {Direction::Of::Slanted, {}};
+  VerifyParams params{.triangles = triangles};
+  params.loads = {{"down", {foot}, {force}}, {"aslant", {foot}, {slanted}}};
+  const Verification stated = verify(model.proxy, model.partition, params);
+  const Verification& built_in = upright();
+  ASSERT_EQ(stated.parts.parts.size(), built_in.parts.parts.size());
+  for (std::size_t i = 0; i < stated.parts.parts.size(); ++i)
+    EXPECT_EQ(stated.parts.parts[i].reason(), built_in.parts.parts[i].reason());
+  EXPECT_EQ(stated.parts.parts[1].stress().axial, built_in.parts.parts[1].stress().axial);
+  ASSERT_EQ(stated.selected.size(), 4U);
+  EXPECT_EQ(stated.selected[3].load_case, "aslant");
+  EXPECT_NEAR(stated.selected[3].area_mm2, 50 * 50, 30);  // the base hides nothing
+}
+
+TEST(Verify, StatedLoadsTakeThePlaceOfTheBuiltInOnes) {
+  // Straight down on the end of the post: F / A along it. The built-in load_n does nothing then.
+  const CylinderOnBox model;
+  VerifyParams params{.load_n = 1e6, .triangles = triangles};
+  Support foot;
+  foot.where.half_spaces = {{{0, 0, 1}, {0, 0, 1}}};
+  TotalForce force{.newton = 1000};
+  force.where.half_spaces = {{{0, 0, 79}, {0, 0, -1}}};
+  params.loads = {{"press", {foot}, {force}}};
+  const double area = std::numbers::pi * 64;
+  const Verification pressed = verify(model.proxy, model.partition, params);
+  EXPECT_NEAR(pressed.parts.parts[1].stress().axial * area / 1000, 1, 0.05);
+  EXPECT_LT(pressed.equilibrium, 1e-9);
+  // The same as a pressure on the end alone.
+  Pressure pressure{.mpa = 1000 / area};
+  pressure.where.box_mm = Box3d{{-20, -20, 79.5}, {20, 20, 81}};
+  params.loads[0].forces = {pressure};
+  EXPECT_NEAR(verify(model.proxy, model.partition, params).parts.parts[1].stress().axial * area / 1000, 1, 0.08);
+}
+
+TEST(Verify, OwnWeightPressesWithHalfTheLengthOnAverage) {
+  const CylinderOnBox model;
+  VerifyParams params{.triangles = triangles};
+  params.loads = load_preset("stand");
+  const Verification v = verify(model.proxy, model.partition, params, material("AlSi10Mg"));
+  const double mean = 2.67e-6 * 9.80665 * 60 / 2;  // MPa: N/mm3 times half the post's length
+  ASSERT_EQ(v.parts.parts.size(), 2U);
+  EXPECT_NEAR(v.parts.parts[1].stress().axial / mean, 1, 0.05);
+  EXPECT_LT(v.equilibrium, 1e-9);
+}
+
+TEST(Verify, CasesMayStandOnDifferentSupports) {
+  // Pulled apart: held at the foot in one case, slid and cornered in the other. Each is what it is alone.
+  const CylinderOnBox model;
+  Support foot, plane, corner;
+  foot.where.lowest = plane.where.lowest = EndShare{.share = 0.05};
+  plane.sliding = Direction{Direction::Of::Up, {}};
+  corner.where.box_mm = Box3d{{15, 15, -2}, {30, 30, 5}};
+  Selection end;
+  end.highest = EndShare{.share = 0.05};
+  const Direction up{Direction::Of::Up, {}}, down{Direction::Of::Down, {}};
+  const LoadCase a{"pull", {foot}, {TotalForce{1000, up, end}}};
+  const LoadCase b{"slide", {plane, corner}, {TotalForce{3000, down, end}}};
+  const auto run = [&](std::vector<LoadCase> loads) {
+    VerifyParams params{.triangles = 1500};
+    params.loads = std::move(loads);
+    return verify(model.proxy, model.partition, params);
+  };
+  const Verification both = run({a, b}), one = run({a}), other = run({b});
+  const Vec3d at{0, 0, 60}, normal{0, 0, 1};
+  EXPECT_NEAR(one.traction_mpa(at, normal), 1000 / (std::numbers::pi * 64), 0.5);
+  EXPECT_EQ(both.traction_mpa(at, normal), other.traction_mpa(at, normal));  // the larger
+  EXPECT_LT(both.equilibrium, 1e-9);
+}
+
+/// Loads are stated in the world; parts are decided in the frame in which the model stands.
+TEST(Verify, LoadsAreFoundInTheFrameOfTheStance) {
+  CylinderOnBox model;
+  VerifyParams params{.triangles = 1500};
+  Support foot;
+  foot.where.half_spaces = {{{0, 0, 1}, {0, 0, 1}}};
+  TotalForce force{.newton = 1000, .direction = {Direction::Of::World, {0.2, 0, -1}}};
+  force.where.half_spaces = {{{0, 0, 79}, {0, 0, -1}}, {{1, 0, 0}, {1, 0, 0}}};
+  params.loads = {{"press", {foot}, {force}}};
+  const Verification standing = verify(model.proxy, model.partition, params);
+
+  VerifyParams askew = params;
+  askew.up = {1, 2, 3};
+  askew.azimuth_deg = 33;
+  const Frame stand = stance(askew);
+  const auto to_world = [&](Vec3d v) { return v.x * stand.x + v.y * stand.y + v.z * stand.z; };
+  for (Selection* where : {&foot.where, &force.where})
+    for (HalfSpace& half : where->half_spaces) half = {to_world(half.point_mm), to_world(half.normal)};
+  force.direction.vector = to_world(force.direction.vector);
+  askew.loads = {{"press", {foot}, {force}}};
+  model.proxy.frame = stand;
+  const Verification lying = verify(model.proxy, model.partition, in_stance(askew));
+  ASSERT_EQ(lying.parts.parts.size(), standing.parts.parts.size());
+  for (std::size_t i = 0; i < lying.parts.parts.size(); ++i) {
+    const double axial = standing.parts.parts[i].stress().axial;
+    EXPECT_NEAR(lying.parts.parts[i].stress().axial, axial, 1e-9 * axial);
+  }
+  // A message speaks of the world.
+  askew.loads[0].forces = {Pressure{.mpa = 1, .where = {.box_mm = Box3d{{500, 500, 500}, {501, 501, 501}}}}};
+  try {
+    static_cast<void>(verify(model.proxy, model.partition, in_stance(askew)));
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), Code::BadRecipe);
+    EXPECT_THAT(error.what(), HasSubstr("load case 'press' selects nothing: 0 mm2"));
+  }
+}
+
+TEST(Verify, ALabelIsACandidate) {
+  const CylinderOnBox model;
+  VerifyParams params{.triangles = 1500};
+  Support foot;
+  foot.where.lowest = EndShare{.share = 0.05};
+  Pressure pressure{.mpa = 1};
+  pressure.where.label = 1;  // the post: its side and its end
+  params.loads = {{"squeeze", {foot}, {pressure}}};
+  const Verification v = verify(model.proxy, model.partition, params);
+  EXPECT_NEAR(v.selected.at(1).area_mm2 / (2 * std::numbers::pi * 8 * 60 + std::numbers::pi * 64), 1, 0.04);
 }
 
 TEST(Verify, TenTimesTheForceDecidesTheSame) {

@@ -61,6 +61,7 @@ struct ModelReport {
 struct VerificationReport {
   std::int64_t tets = 0, dof = 0;        ///< Of all solves together.
   double residual = 0, equilibrium = 0;  ///< Relative, of the worst solve.
+  std::vector<Selected> selected;        ///< What supports and forces got hold of.
 };
 /// What the finished solid carries under one load case (strength.h).
 struct StrengthReport {

@@ -22,10 +22,11 @@ struct StressField {
   Material material;
   struct Fixed {
     std::uint32_t node = 0;
-    int axis = 0;  ///< 0, 1 or 2 of the frame's axes.
+    int axis = 0;  ///< 0, 1 or 2 of the axes of the case's `held_in`.
   };
   struct Case {
     std::string name;
+    Frame held_in{};                       ///< Whose axes supports hold, in the coordinates of the field.
     std::vector<Fixed> fixed;              ///< Displacements held at zero.
     std::vector<Vec3d> force_n;            ///< Per node.
     std::vector<Vec3d> displacement_mm;    ///< Per node.
@@ -41,7 +42,7 @@ void write_vtu(const std::filesystem::path& path, const StressField& field, cons
 
 /// A CalculiX (Abaqus) deck: ten-node tetrahedra, one step per load case, in the field's own frame; asks for the
 /// displacements of all nodes and the stresses at the integration points, as text. N, mm, MPa. @throws Error Io,
-/// Cancelled.
+/// Cancelled, Unsupported: a support slides askew to the field's axes.
 void write_inp(const std::filesystem::path& path, const StressField& field, const Context& context = {});
 
 }  // namespace fibrolite
