@@ -27,8 +27,12 @@ CellStress cell_stress(const VoxelModel& model, const VoxelElement& element, dou
   const double mu = 0.5 * young_mpa / ((1 + poisson) * model.edge_mm);
   const double lambda = young_mpa * poisson / ((1 + poisson) * (1 - 2 * poisson) * model.edge_mm);
   const double spread = lambda * (strain[0] + strain[1] + strain[2]);
-  return {spread + 2 * mu * strain[0], spread + 2 * mu * strain[1], spread + 2 * mu * strain[2],
-          mu * strain[3],              mu * strain[4],              mu * strain[5]};
+  return {spread + 2 * mu * strain[0],
+          spread + 2 * mu * strain[1],
+          spread + 2 * mu * strain[2],
+          mu * strain[3],
+          mu * strain[4],
+          mu * strain[5]};
 }
 
 namespace {
