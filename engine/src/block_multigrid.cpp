@@ -9,8 +9,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <numeric>
 #include <utility>
 
@@ -61,7 +59,7 @@ struct BlockMultigrid::Level final : SmoothLevel {
   std::vector<std::uint32_t> column, back_row;
   std::vector<std::size_t> back_slot;
   std::vector<float> value;
-  mutable std::vector<float> product, direction, rest, coarse_b, coarse_x, coarse_more;
+  mutable std::vector<float> product, direction, rest, coarse_b, coarse_x;
 
   [[nodiscard]] std::size_t size() const override { return 6 * matrix.rows(); }
   void apply(const float* x, float* y) const override { matrix.apply(x, y); }
@@ -170,8 +168,8 @@ struct BlockMultigrid::Level final : SmoothLevel {
             const Block6 b = matrix.block(e);
             image.at(parent[e.column]) += Eigen::Map<const Matrix6>(b.data()) * motion(e.column);
           }
-          const Matrix6 d = Eigen::Map<const Eigen::Matrix<float, 6, 6, Eigen::RowMajor>>(inverse.data() + 36 * i)
-                                .cast<double>();
+          const Matrix6 d =
+              Eigen::Map<const Eigen::Matrix<float, 6, 6, Eigen::RowMajor>>(inverse.data() + 36 * i).cast<double>();
           for (const auto& [c, m] : image.list) p.at(c) -= omega * d * m;
         }
       });
@@ -222,7 +220,6 @@ struct BlockMultigrid::Level final : SmoothLevel {
     coarse.finish();
     coarse_b.resize(6 * next.box.size());
     coarse_x.resize(6 * next.box.size());
-    coarse_more.resize(6 * next.box.size());
     return coarse;
   }
 
@@ -331,8 +328,8 @@ BlockMultigrid::BlockMultigrid(BlockMatrix matrix, AggregatePlaces places, const
       }
     }
     level->smoother.largest = largest_eigenvalue(*level, 12);
-    if (getenv("CT")) sscanf(getenv("CT"), "%d,%lf", &level->smoother.degree, &level->smoother.ratio);
-    if (getenv("FEM_TUNE")) fprintf(stderr, "level rows %zu blocks %zu lambda %g\n", level->matrix.rows(), level->matrix.blocks(), level->smoother.largest);
+    level->smoother.degree = 4;
+    level->smoother.ratio = 30;
     if (!last) coarse = level->coarsen(parent, next, 4.0 / (3 * level->smoother.largest), context);
     level->matrix.round();
     level->places = {};
@@ -345,39 +342,34 @@ BlockMultigrid::BlockMultigrid(BlockMatrix matrix, AggregatePlaces places, const
 
 BlockMultigrid::~BlockMultigrid() = default;
 
-void BlockMultigrid::solve(const float* b, float* x) const { cycle(0, b, x); }
+void BlockMultigrid::solve(const float* b, float* x) const { cycle(0, b, x, true); }
 
-void BlockMultigrid::cycle(std::size_t at, const float* b, float* x) const {
+void BlockMultigrid::cycle(std::size_t at, const float* b, float* x, bool zero) const {
   const Level& level = *levels_[at];
-  if (at + 1 == levels_.size() && dense_ != nullptr) {
+  const bool last = at + 1 == levels_.size();
+  if (last && dense_ != nullptr) {
     dense_->solve(b, x);
     return;
   }
   const std::size_t n = level.size();
-  std::fill_n(x, n, 0.0F);
-  if (at + 1 == levels_.size()) {
-    Chebyshev many = level.smoother;
-    many.degree = 30;
-    many.ratio = 1000;
-    many.smooth(level, b, x, level.product.data(), level.direction.data(), true);
+  float* y = level.product.data();
+  float* d = level.direction.data();
+  if (zero) std::fill_n(x, n, 0.0F);
+  if (last) {
+    Chebyshev{level.smoother.largest, 1000, 30}.smooth(level, b, x, y, d, zero);
     return;
   }
-  level.smoother.smooth(level, b, x, level.product.data(), level.direction.data(), true);
-  level.apply(x, level.product.data());
-  for (std::size_t i = 0; i < n; ++i) level.rest[i] = b[i] - level.product[i];
+  level.smoother.smooth(level, b, x, y, d, zero);
+  level.apply(x, y);
+  chunked(n, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) level.rest[i] = b[i] - y[i];
+  });
   level.restrict_to(level.rest.data(), level.coarse_b.data());
-  static const bool two = getenv("WC") != nullptr;
-  cycle(at + 1, level.coarse_b.data(), level.coarse_x.data());
-  if (two && !(at + 2 == levels_.size() && dense_ != nullptr)) {
-    const Level& next = *levels_[at + 1];
-    std::vector<float> ax(next.size()), rr(next.size()), more(next.size());
-    next.apply(level.coarse_x.data(), ax.data());
-    for (std::size_t i = 0; i < ax.size(); ++i) rr[i] = level.coarse_b[i] - ax[i];
-    cycle(at + 1, rr.data(), more.data());
-    for (std::size_t i = 0; i < ax.size(); ++i) level.coarse_x[i] += more[i];
-  }
+  // Twice (a W cycle): the coarse levels cost little and on lattices they are what slows the solve.
+  cycle(at + 1, level.coarse_b.data(), level.coarse_x.data(), true);
+  if (at + 2 < levels_.size()) cycle(at + 1, level.coarse_b.data(), level.coarse_x.data(), false);
   level.prolong_from(level.coarse_x.data(), x);
-  level.smoother.smooth(level, b, x, level.product.data(), level.direction.data(), false);
+  level.smoother.smooth(level, b, x, y, d, false);
 }
 
 }  // namespace fibrolite

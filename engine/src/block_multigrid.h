@@ -22,13 +22,13 @@ class BlockMultigrid {
   /// Cost: O(blocks of the matrix). @throws Error Cancelled.
   BlockMultigrid(BlockMatrix matrix, AggregatePlaces places, const Context& context);
   ~BlockMultigrid();
-  /// x is about A^-1 b; a symmetric positive operator. Same bits on any number of threads.
+  /// x is about A^-1 b, by one W cycle: a symmetric positive operator. Same bits on any number of threads.
   void solve(const float* b, float* x) const;
 
  private:
   struct Level;
   struct Dense;
-  void cycle(std::size_t level, const float* b, float* x) const;
+  void cycle(std::size_t level, const float* b, float* x, bool zero) const;
   std::vector<std::unique_ptr<Level>> levels_;
   std::unique_ptr<Dense> dense_;
 };

@@ -20,7 +20,8 @@ struct SmoothLevel {
 /// that the smoother then excites what it should damp. Same bits on any number of threads.
 [[nodiscard]] double largest_eigenvalue(const SmoothLevel& level, int steps);
 
-/// Chebyshev polynomial for the eigenvalues in [largest / ratio, largest] of D^-1 A (Adams, Brezina, Hu, Tuminaro 2003).
+/// Chebyshev polynomial for the eigenvalues in [largest / ratio, largest] of D^-1 A (Adams, Brezina, Hu, Tuminaro
+/// 2003).
 struct Chebyshev {
   double largest = 1;
   double ratio = 16;

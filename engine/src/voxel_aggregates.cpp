@@ -243,8 +243,8 @@ struct VoxelAggregates::Worker {
     const Vec3i o = model.origin[block];
     for (int k = 0; k < 27; ++k) {
       const int dx = k / 9 - 1, dy = k / 3 % 3 - 1, dz = k % 3 - 1;
-      const std::uint32_t other = k == 13 ? static_cast<std::uint32_t>(block)
-                                          : model.find({o.x + 8 * dx, o.y + 8 * dy, o.z + 8 * dz});
+      const std::uint32_t other =
+          k == 13 ? static_cast<std::uint32_t>(block) : model.find({o.x + 8 * dx, o.y + 8 * dy, o.z + 8 * dz});
       if (other == none) continue;
       model.node_table(other, table.data());
       each_cell(model, other, [&](int low, int c, float fraction) {

@@ -7,10 +7,10 @@
 
 namespace fibrolite {
 
-/// A cube of edge 1 and Young's modulus 1: eight corners, a = 4 x + 2 y + z, each with three displacements (3 a + axis).
-/// Trilinear with Wilson's nine incompatible modes condensed out (Taylor, Beresford, Wilson 1976): bends as a beam
-/// does even where a member is two or three cells thick, passes the patch test, costs the same to apply. A cube of edge
-/// h and modulus E has h E times this.
+/// A cube of edge 1 and Young's modulus 1: eight corners, a = 4 x + 2 y + z, each with three displacements (3 a +
+/// axis). Trilinear with Wilson's nine incompatible modes condensed out (Taylor, Beresford, Wilson 1976): bends as a
+/// beam does even where a member is two or three cells thick, passes the patch test, costs the same to apply. A cube of
+/// edge h and modulus E has h E times this.
 struct VoxelElement {
   /// K = W^T M W with W the 8-point Hadamard transform of each axis. In that basis the three reflections of a cube
   /// leave only couplings between (c ^ bit(i), i) and (c ^ bit(j), j): eight 3x3 matrices, each xx yy zz xy yz zx.

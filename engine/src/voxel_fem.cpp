@@ -67,8 +67,8 @@ std::optional<double> VoxelFemResult::von_mises_mpa(Vec3d p) const {
   if (!found) return {};
   std::array<std::uint32_t, 729> table;
   impl_->model.node_table(found->block, table.data());
-  return von_mises(cell_stress(impl_->model, impl_->element, impl_->young_mpa, impl_->poisson, impl_->u, table.data(),
-                               found->low));
+  return von_mises(
+      cell_stress(impl_->model, impl_->element, impl_->young_mpa, impl_->poisson, impl_->u, table.data(), found->low));
 }
 
 namespace {
@@ -148,7 +148,8 @@ Solved conjugate_gradients(const VoxelOperator& k, const VoxelMultigrid& precond
     curvature = dot(p, image);
     const double alpha = dot(r, p) / curvature;
     if (!(curvature > 0) || !std::isfinite(alpha)) {
-      throw Error(Code::SolverFailed, "the voxel solver met a motion without stiffness", {}, "support the solid better");
+      throw Error(Code::SolverFailed, "the voxel solver met a motion without stiffness", {},
+                  "support the solid better");
     }
     chunked(n, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i) {

@@ -163,10 +163,9 @@ void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32
                               : above != VoxelModel::none
                                   ? model.fraction[std::size_t{512} * above + c - 7 * step[axis]]
                                   : 0;
-      const float low_side = at > 0 ? fraction[c - step[axis]]
-                             : below != VoxelModel::none
-                                 ? model.fraction[std::size_t{512} * below + c + 7 * step[axis]]
-                                 : 0;
+      const float low_side = at > 0                      ? fraction[c - step[axis]]
+                             : below != VoxelModel::none ? model.fraction[std::size_t{512} * below + c + 7 * step[axis]]
+                                                         : 0;
       face(true, here - high_side);
       face(false, here - low_side);
     }

@@ -2,7 +2,6 @@
 #include "voxel_multigrid.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <utility>
 
 namespace fibrolite {
@@ -33,25 +32,18 @@ VoxelMultigrid::VoxelMultigrid(const VoxelOperator& fine)
     : fine_(fine), nodes_(std::make_unique<Nodes>(fine)), aggregates_(fine) {
   // No eigenvalue of D^-1 K is above the largest of a cell's own.
   const double bound = fine.element().largest / fine.element().diagonal;
-  smoother_.largest = std::min(bound, largest_eigenvalue(*nodes_, 12));
+  smoother_ = {std::min(bound, largest_eigenvalue(*nodes_, 12)), 12, 2};
   omega_ = 4.0 / (3 * smoother_.largest);
-  coarse_ = std::make_unique<BlockMultigrid>(aggregates_.coarse_matrix(omega_, nodes_->inverse),
-                                             AggregatePlaces{aggregates_.centres(), aggregates_.boxes()},
-                                             fine.context());
+  coarse_ =
+      std::make_unique<BlockMultigrid>(aggregates_.coarse_matrix(omega_, nodes_->inverse),
+                                       AggregatePlaces{aggregates_.centres(), aggregates_.boxes()}, fine.context());
   product_.resize(fine.size());
   direction_.resize(fine.size());
   coarse_b_.resize(6 * aggregates_.size());
   coarse_x_.resize(6 * aggregates_.size());
-  if (getenv("FEM_TUNE")) {
-    fprintf(stderr, "bound %g lambda %g aggregates %zu nodes %zu\n", bound, smoother_.largest, aggregates_.size(),
-            fine.model().nodes());
-    sscanf(getenv("FEM_TUNE"), "%d,%lf", &smoother_.degree, &smoother_.ratio);
-  }
 }
 
 VoxelMultigrid::~VoxelMultigrid() = default;
-
-const std::vector<float>& VoxelMultigrid::inverse_diagonal() const { return nodes_->inverse; }
 
 void VoxelMultigrid::apply(const float* r, float* z) const {
   float* y = product_.data();

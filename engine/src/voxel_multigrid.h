@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The preconditioner of the voxel solver: one multigrid V cycle.
+// The preconditioner of the voxel solver: one multigrid cycle.
 #pragma once
 
 #include <memory>
@@ -22,7 +22,6 @@ class VoxelMultigrid {
   ~VoxelMultigrid();
   /// z is about K^-1 r; r is 0 where fixed. Cost: 2 * degree + 2 products with K and the coarse levels.
   void apply(const float* r, float* z) const;
-  [[nodiscard]] const std::vector<float>& inverse_diagonal() const;
 
  private:
   struct Nodes;

@@ -27,7 +27,8 @@ void chunked(std::size_t n, const std::function<void(std::size_t, std::size_t)>&
 class VoxelOperator {
  public:
   /// `fixed` are the entries of a vector that do not move, rising.
-  VoxelOperator(const VoxelModel& model, const VoxelElement& element, std::vector<std::uint32_t> fixed, Context context);
+  VoxelOperator(const VoxelModel& model, const VoxelElement& element, std::vector<std::uint32_t> fixed,
+                Context context);
 
   [[nodiscard]] const VoxelModel& model() const { return model_; }
   [[nodiscard]] const VoxelElement& element() const { return element_; }

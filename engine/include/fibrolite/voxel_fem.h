@@ -40,7 +40,7 @@ struct VoxelFemProblem {
   std::function<Vec3d(Vec3d)> body_force_n_mm3;  ///< Per mm3 of material at a point, e.g. its weight; empty: 0. Pure.
   double residual = 1e-6;                        ///< Asked for; in [1e-12, 0.1].
   int max_iterations = 500;                      ///< > 0.
-  Shape unmeasured;                              ///< Cells whose centre is in here give no stress: clamps, load patches.
+  Shape unmeasured;  ///< Cells whose centre is in here give no stress: clamps, load patches.
 };
 
 /// What a solid does under its loads. Displacement is trilinear between the nodes of cells. Stress is that of the
@@ -54,12 +54,12 @@ class VoxelFemResult {
   std::int64_t cells = 0, nodes = 0;
   double volume_mm3 = 0;  ///< Sum of the cells' material.
   int iterations = 0;
-  double residual = 0;          ///< |f - K u| / |f| over the free components, in double precision.
-  double compliance_n_mm = 0;   ///< Load times displacement: twice the work the loads do.
+  double residual = 0;         ///< |f - K u| / |f| over the free components, in double precision.
+  double compliance_n_mm = 0;  ///< Load times displacement: twice the work the loads do.
   double max_displacement_mm = 0;
-  Vec3d load_n{}, reaction_n{};  ///< Sums; in equilibrium they cancel.
-  double max_von_mises_mpa = 0;  ///< Of any measured cell. Grows without limit at re-entrant edges as voxels shrink.
-  double p99_von_mises_mpa = 0;  ///< 99 % of the measured material is at or below this.
+  Vec3d load_n{}, reaction_n{};   ///< Sums; in equilibrium they cancel.
+  double max_von_mises_mpa = 0;   ///< Of any measured cell. Grows without limit at re-entrant edges as voxels shrink.
+  double p99_von_mises_mpa = 0;   ///< 99 % of the measured material is at or below this.
   double peak_von_mises_mpa = 0;  ///< Largest after averaging stress over the cells around each node, then each cell.
   Vec3d weakest_mm{};             ///< Centre of the cell of that peak.
 
