@@ -55,10 +55,11 @@ class Reader {
   using Keys = std::vector<std::pair<std::string, std::function<void(const Reader&)>>>;
   void object(const Keys& keys) const {
     if (!json_.is_object()) refuse("an object, { ... }");
-    for (const auto& [name, value] : json_.items()) {
+    for (const auto& item : json_.items()) {
+      const std::string& name = item.key();
       const auto known = std::find_if(keys.begin(), keys.end(), [&](const auto& key) { return key.first == name; });
       if (known != keys.end()) {
-        known->second(Reader(value, key_ + "." + name, source_));
+        known->second(Reader(item.value(), key_ + "." + name, source_));
         continue;
       }
       std::vector<std::string> names;
