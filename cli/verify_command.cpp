@@ -89,7 +89,7 @@ void run_verify(const VerifyOptions& options) {
   const Verification verified = stage("verify", [&] {
     return verify(found.proxy, found.partition, params, recipe.material, context.part(0.35, 0.6, "verify"));
   });
-  report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium};
+  report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium, verified.selected};
   report.warnings.insert(report.warnings.end(), verified.notes.begin(), verified.notes.end());
   for (const Part& part : placed(verified.parts, found.proxy.frame).parts) report.parts.push_back(part_report(part));
 

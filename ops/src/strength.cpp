@@ -57,7 +57,8 @@ class Seen final : public Shape::Function {
       const Vec3d q{p.x - low_.x, p.y - low_.y, 0};
       const bool beside =
           q.x < 0 || q.y < 0 || q.x >= static_cast<double>(width_) * pixel_mm_ || pixel(p) >= height_.size();
-      const double below = beside ? far_mm : static_cast<double>(height_[pixel(p)]) - p.z;
+      const float top = beside ? -far_mm : height_[pixel(p)];
+      const double below = top > -far_mm ? static_cast<double>(top) - p.z : far_mm;  // nothing to be seen: far
       out[i] = static_cast<float>(below - layer_mm_);
     }
   }
