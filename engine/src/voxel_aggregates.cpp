@@ -45,6 +45,7 @@ VoxelAggregates::VoxelAggregates(const VoxelOperator& fine) : fine_(fine) {
   };
   std::vector<std::uint32_t> table(729);
   for (std::size_t b = 0; b < model.blocks(); ++b) {
+    if (b % 256 == 0) fine.context().check();
     model.node_table(b, table.data());
     const Vec3i o = model.origin[b];
     each_cell(model, b, [&](int low, int c, float) {
@@ -68,7 +69,6 @@ VoxelAggregates::VoxelAggregates(const VoxelOperator& fine) : fine_(fine) {
       }
     });
   }
-  std::vector<std::uint32_t> count;
   for (std::size_t b = 0; b < model.blocks(); ++b) {
     model.each_own_node(b, [&](std::uint32_t i, Vec3i at) {
       const Vec3i box = box_of(at);
@@ -78,10 +78,8 @@ VoxelAggregates::VoxelAggregates(const VoxelOperator& fine) : fine_(fine) {
         of_node_[i] = none;
         return;
       }
-      // A root is the smallest of its nodes and nodes come in order: its number stands when the others ask for it, and
-      // is put in place of the root only after the last find.
-      const std::uint32_t r = root(i);
-      if (r == i) box_.push_back(box);
+      // A root is the smallest of its nodes, and nodes come in order: boxes are numbered as the roots are below.
+      if (root(i) == i) box_.push_back(box);
     });
   }
   std::vector<std::uint32_t> number(n, none);
@@ -345,7 +343,8 @@ struct VoxelAggregates::Worker {
   BlockSum sum;
 };
 
-BlockMatrix VoxelAggregates::coarse_matrix(double omega, const std::vector<float>& inverse_diagonal) const {
+BlockMatrix VoxelAggregates::coarse_matrix(double omega, const std::vector<float>& inverse_diagonal,
+                                           const Context& context) const {
   const VoxelModel& model = fine_.model();
   std::vector<std::uint8_t> held(model.nodes(), 0);
   for (const std::uint32_t i : fine_.fixed()) held[i / 3] |= static_cast<std::uint8_t>(1U << (i % 3));
@@ -356,7 +355,8 @@ BlockMatrix VoxelAggregates::coarse_matrix(double omega, const std::vector<float
       [&] { return Worker(*this, inverse_diagonal, static_cast<float>(omega), held); });
   std::vector<BlockSum> sums(batch);
   for (std::size_t start = 0; start < model.blocks(); start += batch) {
-    fine_.context().check();
+    context.check();
+    context.progress(static_cast<double>(start) / static_cast<double>(model.blocks()));
     const std::size_t n = std::min(batch, model.blocks() - start);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 1), [&](const auto& range) {
       Worker& worker = workers.local();

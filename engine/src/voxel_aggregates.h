@@ -28,7 +28,8 @@ class VoxelAggregates {
   void from_nodes(const float* f, float* c) const;
   /// P^T K P with P = (1 - omega D^-1 K) T. Cost: about 20 k flops per cell, parallel; same bits on any number of
   /// threads. @throws Error Cancelled.
-  [[nodiscard]] BlockMatrix coarse_matrix(double omega, const std::vector<float>& inverse_diagonal) const;
+  [[nodiscard]] BlockMatrix coarse_matrix(double omega, const std::vector<float>& inverse_diagonal,
+                                          const Context& context) const;
 
  private:
   struct Worker;

@@ -114,7 +114,10 @@ Solved conjugate_gradients(const VoxelOperator& k, const VoxelMultigrid& precond
     return std::sqrt(dot(r, r));
   };
   const double start = true_residual();
-  if (!(start > 0)) return {};
+  if (start == 0) return {};
+  if (!std::isfinite(start)) {
+    throw Error(Code::SolverFailed, "the loads are too large for the stiffness", {}, "check the units");
+  }
   Solved result;
   double norm = start, curvature = 0, best = start;
   int since_best = 0;
@@ -180,6 +183,7 @@ VoxelFemResult solve(const VoxelFemProblem& problem, const Context& context) {
     impl->model = voxel_model(problem.solid, problem.coarsen, pieces, context);
     if (impl->model.nodes() == 0) throw Error(Code::BadRecipe, "the solid has no material", "solid");
     supports = voxel_supports(impl->model, problem.supports);
+    context.check();
     check_held(impl->model, pieces, supports.fixed);
   }
   const VoxelModel& model = impl->model;
@@ -194,8 +198,7 @@ VoxelFemResult solve(const VoxelFemProblem& problem, const Context& context) {
   for (double& v : f) v /= unit;
   {
     const Context setup = context.part(0, 0.3, "multigrid");
-    const VoxelMultigrid multigrid(stiffness);
-    setup.progress(1);
+    const VoxelMultigrid multigrid(stiffness, setup);
     const Solved solved = conjugate_gradients(stiffness, multigrid, f, u, problem, context.part(0.3, 0.95, "solve"));
     result.iterations = solved.iterations;
     result.residual = solved.residual;
@@ -225,11 +228,14 @@ VoxelFemResult solve(const VoxelFemProblem& problem, const Context& context) {
   }
   result.max_displacement_mm = std::sqrt(largest);
   const StressSummary stress =
-      measure_stress(model, impl->element, problem.young_mpa, problem.poisson, u, problem.unmeasured);
+      measure_stress(model, impl->element, problem.young_mpa, problem.poisson, u, problem.unmeasured, context);
   result.max_von_mises_mpa = stress.max_mpa;
   result.p99_von_mises_mpa = stress.p99_mpa;
   result.peak_von_mises_mpa = stress.peak_mpa;
   result.weakest_mm = stress.weakest_mm;
+  if (!std::isfinite(result.compliance_n_mm + result.max_displacement_mm + result.max_von_mises_mpa)) {
+    throw Error(Code::SolverFailed, "the loads are too large for the stiffness", {}, "check the units");
+  }
   context.progress(1);
   return result;
 }

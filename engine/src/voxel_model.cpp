@@ -83,7 +83,7 @@ void fill(VoxelModel& model, const Solid& solid, int coarsen, const Context& con
 }
 
 /// Join cells face to face (union-find, the smaller number is the root), number the pieces, drop the empty ones.
-VoxelPieces join(VoxelModel& model, float inside) {
+VoxelPieces join(VoxelModel& model, float inside, const Context& context) {
   const std::size_t n = model.blocks();
   std::vector<std::uint32_t> parent(n * cells);
   std::iota(parent.begin(), parent.end(), 0U);
@@ -101,6 +101,7 @@ VoxelPieces join(VoxelModel& model, float inside) {
   };
   constexpr std::array<std::size_t, 3> step{64, 8, 1};
   for (std::size_t b = 0; b < n; ++b) {
+    if (b % 1024 == 0) context.check();
     std::array<std::uint32_t, 3> next{};
     for (int axis = 0; axis < 3; ++axis) {
       Vec3i o = model.origin[b];
@@ -150,7 +151,7 @@ VoxelPieces join(VoxelModel& model, float inside) {
   return pieces;
 }
 
-void number_nodes(VoxelModel& model) {
+void number_nodes(VoxelModel& model, const Context& context) {
   const std::size_t n = model.blocks();
   constexpr std::uint32_t unset = VoxelModel::none - 1;
   std::vector<std::uint32_t> table(n * places, VoxelModel::none);
@@ -163,6 +164,7 @@ void number_nodes(VoxelModel& model) {
   }
   std::uint32_t next = 0;
   for (std::size_t b = 0; b < n; ++b) {
+    if (b % 1024 == 0) context.check();
     const Vec3i o = model.origin[b];
     std::array<std::uint32_t, 27> around;
     for (int k = 0; k < 27; ++k) {
@@ -222,9 +224,8 @@ VoxelModel voxel_model(const Solid& solid, int coarsen, VoxelPieces& pieces, con
   model.half_sample_mm = 0.5 * solid.grid().voxel_mm;
   fill(model, solid, coarsen, context);
   context.check();
-  pieces = join(model, 0.5F / static_cast<float>(coarsen * coarsen * coarsen));
-  context.check();
-  number_nodes(model);
+  pieces = join(model, 0.5F / static_cast<float>(coarsen * coarsen * coarsen), context);
+  number_nodes(model, context);
   for (std::size_t b = 0; b < model.blocks(); ++b) {
     const Vec3i o = model.origin[b];
     const auto parity = static_cast<std::size_t>(((o.x >> 3) & 1) * 4 + ((o.y >> 3) & 1) * 2 + ((o.z >> 3) & 1));

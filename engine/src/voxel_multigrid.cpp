@@ -28,15 +28,16 @@ struct VoxelMultigrid::Nodes final : SmoothLevel {
   std::vector<float> inverse;  // 1 / diagonal
 };
 
-VoxelMultigrid::VoxelMultigrid(const VoxelOperator& fine)
+VoxelMultigrid::VoxelMultigrid(const VoxelOperator& fine, const Context& context)
     : fine_(fine), nodes_(std::make_unique<Nodes>(fine)), aggregates_(fine) {
   // No eigenvalue of D^-1 K is above the largest of a cell's own.
   const double bound = fine.element().largest / fine.element().diagonal;
   smoother_ = {std::min(bound, largest_eigenvalue(*nodes_, 12)), 12, 2};
   omega_ = 4.0 / (3 * smoother_.largest);
-  coarse_ =
-      std::make_unique<BlockMultigrid>(aggregates_.coarse_matrix(omega_, nodes_->inverse),
-                                       AggregatePlaces{aggregates_.centres(), aggregates_.boxes()}, fine.context());
+  coarse_ = std::make_unique<BlockMultigrid>(
+      aggregates_.coarse_matrix(omega_, nodes_->inverse, context.part(0.1, 0.7, "multigrid")),
+      AggregatePlaces{aggregates_.centres(), aggregates_.boxes()}, context);
+  context.progress(1);
   product_.resize(fine.size());
   direction_.resize(fine.size());
   coarse_b_.resize(6 * aggregates_.size());

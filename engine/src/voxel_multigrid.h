@@ -18,7 +18,7 @@ namespace fibrolite {
 class VoxelMultigrid {
  public:
   /// Cost: as some 30 products with K. @throws Error Cancelled.
-  explicit VoxelMultigrid(const VoxelOperator& fine);
+  VoxelMultigrid(const VoxelOperator& fine, const Context& context);
   ~VoxelMultigrid();
   /// z is about K^-1 r; r is 0 where fixed. Cost: 2 * degree + 2 products with K and the coarse levels.
   void apply(const float* r, float* z) const;

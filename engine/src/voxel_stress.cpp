@@ -39,10 +39,11 @@ class Measure {
     least_ = 0.5F * *std::max_element(m.fraction.begin(), m.fraction.end());
   }
 
-  StressSummary run() {
+  StressSummary run(const Context& context) {
     std::vector<std::vector<std::pair<float, float>>> values(model_.blocks());  // stress, fraction
     at_node_.assign(model_.nodes(), {});
     for (const auto& blocks : model_.colour) {
+      context.check();
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size(), 8), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) first_pass(blocks[i], values[blocks[i]]);
       });
@@ -58,7 +59,9 @@ class Measure {
     }
     values = {};
     if (all.empty()) return result;
+    context.check();
     std::sort(all.begin(), all.end());
+    context.check();
     result.max_mpa = static_cast<double>(all.back().first);
     double below = 0;
     for (const auto& [stress, fraction] : all) {
@@ -151,8 +154,8 @@ class Measure {
 }  // namespace
 
 StressSummary measure_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa, double poisson,
-                             const std::vector<double>& u, const Shape& unmeasured) {
-  return Measure(model, element, young_mpa, poisson, u, unmeasured).run();
+                             const std::vector<double>& u, const Shape& unmeasured, const Context& context) {
+  return Measure(model, element, young_mpa, poisson, u, unmeasured).run(context);
 }
 
 }  // namespace fibrolite

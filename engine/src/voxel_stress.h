@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "fibrolite/context.h"
 #include "fibrolite/shape.h"
 #include "fibrolite/stress.h"
 #include "voxel_element.h"
@@ -23,8 +24,9 @@ struct StressSummary {
   Vec3d weakest_mm{};
 };
 /// Over cells of at least half the fraction of the fullest cell whose centre is not in `unmeasured`. Cost: O(cells),
-/// parallel; the same bits on any number of threads.
+/// parallel; the same bits on any number of threads. @throws Error Cancelled.
 [[nodiscard]] StressSummary measure_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa,
-                                           double poisson, const std::vector<double>& u, const Shape& unmeasured);
+                                           double poisson, const std::vector<double>& u, const Shape& unmeasured,
+                                           const Context& context);
 
 }  // namespace fibrolite
