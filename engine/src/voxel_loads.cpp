@@ -128,7 +128,8 @@ namespace {
 
 constexpr std::array<std::size_t, 3> step{64, 8, 1};
 
-/// visit(face centre, exposed area / edge^2, its four nodes) for faces of the block's cells towards less material.
+/// visit(face centre, exposed area / edge^2, its four nodes, axis and sign of its normal) for faces of the block's
+/// cells towards less material.
 template <class Visit>
 void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32_t* table, const Visit& visit) {
   const float* fraction = model.fraction.data() + 512 * b;
@@ -155,7 +156,7 @@ void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32
         Vec3d centre = model.centre_mm(cell);
         const double half = (high ? 0.5 : -0.5) * model.edge_mm;
         (axis == 0 ? centre.x : axis == 1 ? centre.y : centre.z) += half;
-        visit(centre, static_cast<double>(exposed), nodes);
+        visit(centre, static_cast<double>(exposed), nodes, static_cast<int>(axis), high ? 1.0 : -1.0);
       };
       const float here = fraction[c];
       if (!(here > 0)) continue;
@@ -186,11 +187,16 @@ void add_surface_force(const VoxelModel& model, const VoxelForce& force, std::si
     centre.clear();
     area.clear();
     nodes.clear();
-    each_exposed_face(model, b, table.data(), [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n) {
-      centre.push_back(p);
-      area.push_back(exposed);
-      nodes.push_back(n);
-    });
+    each_exposed_face(model, b, table.data(),
+                      [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n, int axis, double sign) {
+                        if (norm(force.facing) > 0) {
+                          exposed *= sign * force.facing[axis];
+                          if (!(exposed > 1e-9)) return;
+                        }
+                        centre.push_back(p);
+                        area.push_back(exposed);
+                        nodes.push_back(n);
+                      });
     distance.resize(centre.size());
     force.where.evaluate(centre, distance);
     for (std::size_t k = 0; k < centre.size(); ++k) {

@@ -30,7 +30,7 @@ class Seen final : public Shape::Function {
       box.include(frame_.to_local({(corner & 1U) != 0 ? world.max.x : world.min.x,
                                    (corner & 2U) != 0 ? world.max.y : world.min.y,
                                    (corner & 4U) != 0 ? world.max.z : world.min.z}));
-    low_ = box.min;
+    low_ = box.min - Vec3d{0.5 * pixel_mm, 0.5 * pixel_mm, 0};  // samples in the middle of pixels
     width_ = static_cast<std::size_t>(std::ceil(box.size().x / pixel_mm)) + 1;
     height_.assign(width_ * (static_cast<std::size_t>(std::ceil(box.size().y / pixel_mm)) + 1), -far_mm);
     const Shape material = distance_to(solid);
@@ -40,10 +40,12 @@ class Seen final : public Shape::Function {
       material.evaluate(block, value.data());
       std::vector<std::pair<std::size_t, float>> found;
       for (int i = 0; i < block.count; ++i) {
-        if (value[static_cast<std::size_t>(i)] >= 0) continue;
+        // The surface lies as far above a sample as its distance says, at most half a voxel; a sample that far outside
+        // still has material in its cell.
+        const double depth = -static_cast<double>(value[static_cast<std::size_t>(i)]), half = 0.5 * pixel_mm_;
+        if (depth <= -half) continue;
         const Vec3d p = frame_.to_local({block.x[i], block.y[i], block.z[i]});
-        // The surface lies as far above the sample as its distance says, at most half a voxel.
-        const double top = p.z + std::min(-static_cast<double>(value[static_cast<std::size_t>(i)]), 0.5 * pixel_mm_);
+        const double top = p.z + std::min(depth, half);
         found.emplace_back(pixel(p), static_cast<float>(top));
       }
       const std::lock_guard lock(mutex);  // the largest, whoever comes first
@@ -57,7 +59,14 @@ class Seen final : public Shape::Function {
       const Vec3d q{p.x - low_.x, p.y - low_.y, 0};
       const bool beside =
           q.x < 0 || q.y < 0 || q.x >= static_cast<double>(width_) * pixel_mm_ || pixel(p) >= height_.size();
-      const float top = beside ? -far_mm : height_[pixel(p)];
+      float top = -far_mm;
+      if (!beside) {
+        // Where a point lies on the border of pixels the highest of them counts.
+        const double near = 0.25 * pixel_mm_;
+        for (const Vec3d step :
+             {Vec3d{-near, -near, 0}, Vec3d{near, -near, 0}, Vec3d{-near, near, 0}, Vec3d{near, near, 0}})
+          if (const std::size_t at = pixel(p + step); at < height_.size()) top = std::max(top, height_[at]);
+      }
       const double below = top > -far_mm ? static_cast<double>(top) - p.z : far_mm;  // nothing to be seen: far
       out[i] = static_cast<float>(below - layer_mm_);
     }
@@ -88,18 +97,20 @@ class OnVoxels {
     problem.solid = solid_;
     problem.young_mpa = material_.young_mpa;
     problem.poisson = material_.poisson;
-    std::vector<Shape> clamped;
+    std::vector<Shape> clamped, fast;
     for (const Support& support : load.supports) {
       VoxelSupport held{.where = shape(support.where, load.name), .axes = {true, true, true}, .displacement_mm = {}};
       if (support.sliding) held.axes = axes_of(*support.sliding, load.name);
       clamped.push_back(offset(held.where, cell_mm_));
+      if (!support.sliding) fast.push_back(held.where);
       problem.supports.push_back(std::move(held));
     }
-    const Shape supports = unite(clamped);
+    const Shape supports = unite(fast);
     for (const Force& force : load.forces) {
       if (const auto* total = std::get_if<TotalForce>(&force)) {
         const Shape where = subtract(shape(total->where, load.name), supports);
-        problem.forces.push_back({where, total->newton * unit(total->direction)});
+        const Vec3d facing = total->where.seen_from ? unit(*total->where.seen_from) : Vec3d{};
+        problem.forces.push_back({where, total->newton * unit(total->direction), facing});
         clamped.push_back(offset(where, 2 * cell_mm_));
         load_n_ += total->newton;
       } else if (const auto* gravity = std::get_if<Gravity>(&force)) {
@@ -153,7 +164,8 @@ class OnVoxels {
       throw Error(Code::Unsupported, "a selection by label is for bodies, not for finished solids", name,
                   "select by a box or half-spaces");
     if (where.seen_from)
-      all.push_back(Shape(std::make_shared<Seen>(solid_, unit(*where.seen_from), cell_mm_, 0.75 * cell_mm_)));
+      all.push_back(
+          Shape(std::make_shared<Seen>(solid_, unit(*where.seen_from), solid_.grid().voxel_mm, 0.75 * cell_mm_)));
     return intersect(std::move(all));
   }
   [[nodiscard]] Shape end(const EndShare& share, Vec3d along) const {

@@ -28,6 +28,8 @@ struct VoxelSupport {
 struct VoxelForce {
   Shape where;
   Vec3d total_n;
+  /// Unless zero: only faces that look this way, each by its area projected along it. Unit.
+  Vec3d facing{};
 };
 
 struct VoxelFemProblem {
