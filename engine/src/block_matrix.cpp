@@ -53,9 +53,10 @@ void BlockMatrix::add(const BlockSum& sum) {
     auto& list = upper_[row];
     auto at = std::find_if(list.begin(), list.end(), [c = column](const Entry& e) { return e.column == c; });
     if (at == list.end()) {
-      if (count_ % page == 0) pages_.push_back(std::make_unique<Block6[]>(page));
+      if (count_ % page == 0) pages_.push_back(std::make_unique_for_overwrite<Block6[]>(page));
       list.push_back({column, static_cast<std::uint32_t>(count_++)});
       at = list.end() - 1;
+      pages_[at->slot / page][at->slot % page].fill(0);
     }
     Block6& into = pages_[at->slot / page][at->slot % page];
     const Block6& from = sum.value(i);

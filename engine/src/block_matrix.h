@@ -60,7 +60,8 @@ class BlockMatrix {
   void apply(const float* x, float* y) const;
 
  private:
-  static constexpr std::size_t page = 4096;
+  /// Larger than what an allocator keeps for itself: a page given back is back.
+  static constexpr std::size_t page = 1U << 17U;
   [[nodiscard]] const Block6& stored(std::uint32_t slot) const { return pages_[slot / page][slot % page]; }
 
   std::size_t rows_ = 0, count_ = 0;

@@ -153,6 +153,19 @@ struct BlockMultigrid::Level final : SmoothLevel {
     const auto motion = [&](std::size_t i) { return carried(places.centre[i], next.centre[parent[i]]); };
     constexpr std::size_t batch = 8192, grain = 256;
     begin.assign(1, 0);
+    // Growing by doubling would hold three times the memory for a moment: count first.
+    std::size_t total = 0;
+    std::vector<std::uint32_t> parents;
+    for (std::size_t i = 0; i < n; ++i) {
+      parents.clear();
+      for (const BlockMatrix::Entry e : matrix.row(i)) {
+        const std::uint32_t p = parent[e.column];
+        if (std::find(parents.begin(), parents.end(), p) == parents.end()) parents.push_back(p);
+      }
+      total += parents.size();
+    }
+    column.reserve(total);
+    value.reserve(36 * total);
     std::vector<Piece> pieces(std::min(batch, n));
     for (std::size_t start = 0; start < n; start += batch) {
       context.check();
