@@ -31,7 +31,7 @@ struct ComponentSummary {
   Vec3d direction{};                ///< Of the first of them; its largest component is positive.
 };
 [[nodiscard]] ComponentSummary summary(const TetMesh& mesh, const std::vector<fem::Stress>& stress,
-                                    const std::vector<std::uint32_t>& tets, const Material& material);
+                                       const std::vector<std::uint32_t>& tets, const Material& material);
 
 /// In the axis field. Directions across are turned along with t(x), so "the same direction" has a meaning along a bent
 /// limb; all of them are tried, so the answer does not depend on how the model lies.

@@ -277,6 +277,23 @@ TEST(Verify, StressesForParaViewAndADeckForCalculix) {
   EXPECT_THAT(finished.out, HasSubstr("column"));
 }
 
+TEST(Verify, ThePrintedSolidFailsSomewhere) {
+  const TempDir folder;
+  const Finished finished = run({"verify", asset("cylinder_on_box"), "--size", "40", "--infill", "tcs", "--voxel",
+                                 "0.4", "--solid", "--set", "loads=paper-compare", "-o", folder / "v.vtu"});
+  const json report = report_in(folder / "v.report.json");
+  ASSERT_EQ(report["strength"].size(), 1U);
+  const json& answer = report["strength"][0];
+  EXPECT_EQ(answer["load_n"], 110);
+  const double p99 = answer["p99_von_mises_mpa"], yield = report["recipe"]["material"]["yield_mpa"];
+  EXPECT_GT(p99, 0);
+  EXPECT_LE(p99, answer["max_von_mises_mpa"]);
+  EXPECT_NEAR(answer["failure_load_n"], 110 * yield / p99, 1e-6 * 110 * yield / p99);
+  EXPECT_LT(answer["residual"], 1e-6);
+  EXPECT_THAT(answer["weakest"], HasSubstr("part"));
+  EXPECT_THAT(finished.out, HasSubstr("breaks first"));
+}
+
 TEST(Check, TellsAClosedMeshFromAnOpenOne) {
   const TempDir folder;
   write_mesh(folder / "closed.stl", cube(10));
