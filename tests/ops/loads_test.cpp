@@ -299,7 +299,7 @@ TEST(Loads, SupportsSlideOnPlanesThatLieAskew) {
   // Uniform: -5 MPa along the block's height, free to widen.
   for (const fem::Stress& s : solution.centroid_stress) {
     EXPECT_NEAR(fem::normal_stress(s, frame.z), -5, 1e-4);
-    EXPECT_NEAR(fem::von_mises(s), 5, 1e-4);
+    EXPECT_NEAR(von_mises(s), 5, 1e-4);
   }
   for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
     const Vec3d p = box_mesh().nodes[node];
