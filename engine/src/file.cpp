@@ -69,7 +69,7 @@ struct OutputFile::State {
   Slot* slot = nullptr;
   std::vector<std::byte> buffer;
 
-  explicit State(fs::path asked) : target(followed(asked)) {
+  explicit State(const fs::path& asked) : target(followed(asked)) {
     const fs::path folder = folder_of(target);
     std::error_code error;
     if (!fs::is_directory(folder, error))
