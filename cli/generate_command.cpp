@@ -2,7 +2,6 @@
 // generate: model in, hybrid solid out.
 #include <algorithm>
 #include <memory>
-#include <string_view>
 
 #include "commands.h"
 #include "fibrolite/mesh_io.h"
@@ -12,11 +11,9 @@
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
 #include "fibrolite/winding.h"
+#include "job.h"
 #include "options.h"
-#include "outputs.h"
-#include "run.h"
 #include "summary.h"
-#include "terminal.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -40,11 +37,6 @@ struct GenerateOptions {
     return all;
   }
 };
-
-std::string_view name_of(InfillKind kind) {
-  return std::find_if(infill_names.begin(), infill_names.end(), [&](const InfillName& n) { return n.kind == kind; })
-      ->name;
-}
 
 bool is_vdb(const fs::path& file) { return file.extension() == ".vdb" || file.extension() == ".VDB"; }
 
@@ -83,15 +75,11 @@ void generate(const GenerateOptions& options) {
   params.recipe.verify.up = direction(options.model.up);
   check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
 
-  const ThreadLimit threads(options.run.threads);
-  const Terminal terminal(options.run);
-  Outputs outputs(options.targets(), options.model.path, options.run.overwrite);
-  const Context& context = terminal.context();
-  Report report;
-  report.command = "generate";
-  report.recipe = params.recipe;
+  Job job("generate", params.recipe, options.model, options.run, options.targets());
+  const Context& context = job.context();
+  Outputs& outputs = job.outputs;
+  Report& report = job.report;
   report.infill = name_of(options.infill);
-  report.threads = threads.count();
   Stopwatch stage(report.stages);
 
   Model model = load_model(options.model, report, context.part(0, 0.05, "read"));
@@ -127,10 +115,7 @@ void generate(const GenerateOptions& options) {
     for (const fs::path& file : options.output.files)
       if (!is_vdb(file)) write_mesh(outputs.place(file), mesh, context.part(0.92, 1, "write"));
   });
-  write_text(outputs.place(options.output.report_path()), to_json(report));
-  context.check();
-  outputs.commit();
-  context.progress(1);
+  job.finish(options.output.report_path());
   if (!options.run.quiet) print_summary(report, options.targets());
 }
 

@@ -209,6 +209,11 @@ void add_voxel(CLI::App& command, std::optional<double>& voxel_mm, const std::st
   add_positive(command, "--voxel", voxel_mm, help)->type_name("MM");
 }
 
+std::string_view name_of(InfillKind kind) {
+  return std::find_if(infill_names.begin(), infill_names.end(), [&](const InfillName& n) { return n.kind == kind; })
+      ->name;
+}
+
 void add_infill(CLI::App& command, InfillKind& kind) {
   std::vector<std::pair<std::string, InfillKind>> choices;
   std::string help = "What fills the body:";

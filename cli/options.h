@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fibrolite/ops/infill/infill.h"
@@ -54,6 +55,7 @@ void add_options(CLI::App& command, RunOptions& options);
 void add_options(CLI::App& command, OutputOptions& options, const std::vector<std::string>& endings);
 void add_voxel(CLI::App& command, std::optional<double>& voxel_mm, const std::string& help);
 void add_infill(CLI::App& command, InfillKind& kind);
+[[nodiscard]] std::string_view name_of(InfillKind kind);
 /// An extra output with one fixed ending.
 void add_file(CLI::App& command, const std::string& name, std::optional<std::filesystem::path>& file,
               const std::string& ending, const std::string& help);

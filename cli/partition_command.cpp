@@ -12,11 +12,9 @@
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
 #include "fibrolite/to_solid.h"
+#include "job.h"
 #include "options.h"
-#include "outputs.h"
-#include "run.h"
 #include "summary.h"
-#include "terminal.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -91,15 +89,10 @@ void run_partition(const PartitionOptions& options) {
   std::vector<fs::path> targets = options.output.files;
   targets.push_back(options.output.report_path());
 
-  const ThreadLimit threads(options.run.threads);
-  const Terminal terminal(options.run);
-  Outputs outputs(targets, options.model.path, options.run.overwrite);
-  const Context& context = terminal.context();
-  Report report;
-  report.command = "partition";
-  report.recipe = recipe;
-  report.infill = "";
-  report.threads = threads.count();
+  Job job("partition", recipe, options.model, options.run, targets);
+  const Context& context = job.context();
+  Outputs& outputs = job.outputs;
+  Report& report = job.report;
   Stopwatch stage(report.stages);
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
@@ -122,10 +115,7 @@ void run_partition(const PartitionOptions& options) {
       }
     }
   });
-  write_text(outputs.place(options.output.report_path()), to_json(report));
-  context.check();
-  outputs.commit();
-  context.progress(1);
+  job.finish(options.output.report_path());
   if (!options.run.quiet) print_parts(report, targets);
 }
 

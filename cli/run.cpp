@@ -68,10 +68,8 @@ void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, Infi
 FoundParts find_parts(const Model& model, const Recipe& recipe, Report& report, const Context& context) {
   Stopwatch stage(report.stages);
   FoundParts found;
-  const Frame stand = stance(recipe.verify);
-  found.proxy =
-      stage("proxy", [&] { return make_proxy(seen_from(stand, model.mesh), {}, context.part(0, 0.1, "proxy")); });
-  found.proxy.frame = stand;
+  found.proxy = stage(
+      "proxy", [&] { return make_proxy(model.mesh, {.frame = stance(recipe.verify)}, context.part(0, 0.1, "proxy")); });
   const DiameterField field =
       stage("diameter", [&] { return diameter(found.proxy.surface, {}, context.part(0.1, 0.6, "diameter")); });
   found.partition = stage(

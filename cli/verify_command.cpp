@@ -8,11 +8,9 @@
 #include "fibrolite/ops/strength.h"
 #include "fibrolite/ops/stress_field.h"
 #include "fibrolite/winding.h"
+#include "job.h"
 #include "options.h"
-#include "outputs.h"
-#include "run.h"
 #include "summary.h"
-#include "terminal.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -46,66 +44,65 @@ PartReport part_report(const Part& part) {
   return row;
 }
 
-/// The printed solid under the same load cases.
-void analyse_solid(const VerifyOptions& options, const Model& model, const Recipe& recipe, Report& report,
-                   const Context& context) {
+/// The body, taken as solid: its parts and their stresses.
+StressField judge_body(const Model& model, const Recipe& recipe, Report& report, const Context& context) {
   Stopwatch stage(report.stages);
-  HybridizeParams params{.recipe = recipe, .infill = options.infill, .voxel_mm = options.voxel_mm, .steps = false};
-  check_memory(model.mesh, choose_voxel(bounds(model.mesh), recipe, options.infill, options.voxel_mm), recipe,
-               options.infill, options.run);
-  Report made;
-  const Hybrid hybrid = stage("solid", [&] { return hybridize(model, params, made, context.part(0, 0.4, "fill")); });
-  report.solid = made.solid;
-  report.interfaces = made.interfaces;
-  report.warnings = made.warnings;
+  const FoundParts found = find_parts(model, recipe, report, context.part(0, 0.5, ""));
+  Verification verified = stage("verify", [&] {
+    return verify(found.proxy, found.partition, in_stance(recipe.verify), recipe.material,
+                  context.part(0.5, 1, "verify"));
+  });
+  report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium, verified.selected};
+  report.warnings.insert(report.warnings.end(), verified.notes.begin(), verified.notes.end());
+  for (const Part& part : placed(verified.parts, found.proxy.frame).parts) report.parts.push_back(part_report(part));
+  return std::move(verified.field);
+}
+
+/// The printed solid under the same load cases; a hybrid brings the stresses of the body along.
+StressField judge_solid(const VerifyOptions& options, const Model& model, const Recipe& recipe, Report& report,
+                        const Context& context) {
+  const double voxel = choose_voxel(bounds(model.mesh), recipe, options.infill, options.voxel_mm);
+  check_memory(model.mesh, voxel, recipe, options.infill, options.run);
+  const HybridizeParams params{.recipe = recipe, .infill = options.infill, .voxel_mm = voxel, .steps = false};
+  Hybrid hybrid = hybridize(model, params, report, context.part(0, 0.5, "fill"));
+  report.infill = name_of(options.infill);
+  Stopwatch stage(report.stages);
   report.strength = stage("strength", [&] {
     return strength(hybrid, distance_to(WindingTree(model.mesh)), recipe, {.coarsen = options.coarsen},
-                    context.part(0.4, 1, "strength"));
+                    context.part(0.5, 1, "strength"));
   });
+  return std::move(hybrid.field);
 }
 
 void run_verify(const VerifyOptions& options) {
   Recipe recipe = options.recipe.load();
   recipe.verify.up = direction(options.model.up);
+  recipe.verify.keep_field = true;
   std::vector<fs::path> targets = options.output.files;
   targets.push_back(options.output.report_path());
-
-  const ThreadLimit threads(options.run.threads);
-  const Terminal terminal(options.run);
-  Outputs outputs(targets, options.model.path, options.run.overwrite);
-  const Context& context = terminal.context();
-  Report report;
-  report.command = "verify";
-  report.recipe = recipe;
-  report.infill = "";
-  report.threads = threads.count();
+  Job job("verify", recipe, options.model, options.run, targets);
+  const Context& context = job.context();
+  Report& report = job.report;
   Stopwatch stage(report.stages);
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
   report.model.volume_mm3 = signed_volume(model.mesh);
-  const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.35, ""));
-  VerifyParams params = in_stance(verification(recipe));
-  params.keep_field = true;
-  const Verification verified = stage("verify", [&] {
-    return verify(found.proxy, found.partition, params, recipe.material, context.part(0.35, 0.6, "verify"));
-  });
-  report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium, verified.selected};
-  report.warnings.insert(report.warnings.end(), verified.notes.begin(), verified.notes.end());
-  for (const Part& part : placed(verified.parts, found.proxy.frame).parts) report.parts.push_back(part_report(part));
-
-  if (options.solid) analyse_solid(options, model, recipe, report, context.part(0.6, 0.97, "solid"));
+  StressField field;
+  if (options.solid) field = judge_solid(options, model, recipe, report, context.part(0.1, 0.9, ""));
+  if (field.cases.empty()) {
+    Report body = report;  // a solid of one structure has no parts: the body's are only for the fields
+    body.stages.clear();
+    field = judge_body(model, recipe, options.solid ? body : report, context.part(options.solid ? 0.9 : 0.1, 0.95, ""));
+  }
 
   stage("write", [&] {
     for (const fs::path& file : options.output.files) {
       const bool deck = file.extension() == ".inp" || file.extension() == ".INP";
-      if (deck) write_inp(outputs.place(file), verified.field, context);
-      if (!deck) write_vtu(outputs.place(file), verified.field, context);
+      if (deck) write_inp(job.outputs.place(file), field, context);
+      if (!deck) write_vtu(job.outputs.place(file), field, context);
     }
   });
-  write_text(outputs.place(options.output.report_path()), to_json(report));
-  context.check();
-  outputs.commit();
-  context.progress(1);
+  job.finish(options.output.report_path());
   if (!options.run.quiet) print_parts(report, targets);
 }
 

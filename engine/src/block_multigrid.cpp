@@ -9,8 +9,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <utility>
+
+#include "fibrolite/disjoint_sets.h"
 
 #include "chebyshev.h"
 #include "voxel_operator.h"
@@ -105,26 +106,16 @@ struct BlockMultigrid::Level final : SmoothLevel {
       const Vec3i b = places.box[i];
       return Vec3i{third(b.x), third(b.y), third(b.z)};
     };
-    parent.resize(n);
-    std::iota(parent.begin(), parent.end(), 0U);
-    const auto root = [&](std::uint32_t i) {
-      while (parent[i] != i) {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-      }
-      return i;
-    };
+    DisjointSets sets(n);
     for (std::size_t i = 0; i < n; ++i) {
       for (const BlockMatrix::Entry e : matrix.row(i)) {
         if (e.column <= i || !(box(i) == box(e.column))) continue;
-        const std::uint32_t a = root(static_cast<std::uint32_t>(i)), b = root(e.column);
-        if (a != b) parent[std::max(a, b)] = std::min(a, b);
+        sets.join(static_cast<std::uint32_t>(i), e.column);
       }
     }
     std::uint32_t next = 0;
-    std::vector<std::uint32_t> number(n);
-    for (std::uint32_t i = 0; i < n; ++i) number[i] = root(i) == i ? next++ : number[root(i)];
-    parent = number;
+    parent.resize(n);
+    for (std::uint32_t i = 0; i < n; ++i) parent[i] = sets.root(i) == i ? next++ : parent[sets.root(i)];
     return next;
   }
 

@@ -55,7 +55,7 @@ Mesh::Triangle* split(const Points& points, const openvdb::Vec4I& q, Mesh::Trian
   return out;
 }
 
-/// Enclosed volume, either diagonal of a quad given half the say. Chunks are added in order: the same bits on any
+/// Volume that the triangles enclose. Chunks are added in order: the same bits on any
 /// number of threads.
 double volume(const Points& points, const Quads& quads) {
   constexpr std::size_t chunk = 65536;

@@ -5,8 +5,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <numeric>
 #include <tuple>
+
+#include "fibrolite/disjoint_sets.h"
 
 #include "fibrolite/blocks.h"
 #include "fibrolite/error.h"
@@ -85,19 +86,10 @@ void fill(VoxelModel& model, const Solid& solid, int coarsen, const Context& con
 /// Join cells face to face (union-find, the smaller number is the root), number the pieces, drop the empty ones.
 VoxelPieces join(VoxelModel& model, float inside, const Context& context) {
   const std::size_t n = model.blocks();
-  std::vector<std::uint32_t> parent(n * cells);
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t i) {
-    while (parent[i] != i) {
-      parent[i] = parent[parent[i]];
-      i = parent[i];
-    }
-    return i;
-  };
+  DisjointSets sets(n * cells);
   const auto unite = [&](std::size_t i, std::size_t j) {
     if (!(model.fraction[i] > 0) || !(model.fraction[j] > 0)) return;
-    const std::uint32_t a = root(static_cast<std::uint32_t>(i)), b = root(static_cast<std::uint32_t>(j));
-    if (a != b) parent[std::max(a, b)] = std::min(a, b);
+    sets.join(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j));
   };
   constexpr std::array<std::size_t, 3> step{64, 8, 1};
   for (std::size_t b = 0; b < n; ++b) {
@@ -121,9 +113,9 @@ VoxelPieces join(VoxelModel& model, float inside, const Context& context) {
   VoxelPieces pieces;
   std::vector<char> real;
   pieces.of_cell.assign(n * cells, VoxelModel::none);
-  for (std::size_t i = 0; i < parent.size(); ++i) {
+  for (std::size_t i = 0; i < sets.size(); ++i) {
     if (!(model.fraction[i] > 0)) continue;
-    const std::uint32_t r = root(static_cast<std::uint32_t>(i));
+    const std::uint32_t r = sets.root(static_cast<std::uint32_t>(i));
     if (r == i) {
       const auto c = static_cast<int>(i % cells);
       const Vec3i o = model.origin[i / cells];

@@ -12,9 +12,9 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <string>
 
+#include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "fibrolite/realize.h"
@@ -41,20 +41,15 @@ struct Shell {
 };
 
 std::vector<Shell> shells(const Mesh& mesh) {
-  std::vector<std::uint32_t> root(mesh.vertices.size());
-  std::iota(root.begin(), root.end(), 0U);
-  const auto find = [&](std::uint32_t v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
+  DisjointSets sets(mesh.vertices.size());
   for (const auto& t : mesh.triangles) {
-    root[find(t[1])] = find(t[0]);
-    root[find(t[2])] = find(t[0]);
+    sets.join(t[0], t[1]);
+    sets.join(t[0], t[2]);
   }
   std::map<std::uint32_t, std::size_t> number;
   std::vector<Shell> result;
   for (const auto& t : mesh.triangles) {
-    const auto [at, fresh] = number.emplace(find(t[0]), result.size());
+    const auto [at, fresh] = number.emplace(sets.root(t[0]), result.size());
     if (fresh) result.emplace_back();
     Shell& shell = result[at->second];
     shell.triangles.push_back(t);

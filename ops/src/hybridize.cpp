@@ -28,12 +28,9 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   if (params.infill == InfillKind::Hybrid) {
     // Decided as the model stands under its load, however both lie in the file.
     const Frame stand = stance(recipe.verify);
-    const VerifyParams load = in_stance(verification(recipe));
-    const Proxy proxy = run("proxy", 0.02, [&](const Context& c) {
-      Proxy made = make_proxy(seen_from(stand, model.mesh), {}, c);
-      made.frame = stand;
-      return made;
-    });
+    const VerifyParams load = in_stance(recipe.verify);
+    const Proxy proxy =
+        run("proxy", 0.02, [&](const Context& c) { return make_proxy(model.mesh, {.frame = stand}, c); });
     const DiameterField field = run("diameter", 0.08, [&](const Context& c) { return diameter(proxy.surface, {}, c); });
     const Partition cut =
         run("partition", 0.12, [&](const Context& c) { return partition(proxy, field, recipe.partition, c); });
@@ -41,6 +38,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
         run("verify", 0.35, [&](const Context& c) { return verify(proxy, cut, load, recipe.material, c); });
     report_decisions(cut, verified, report);
     out.parts = placed(verified.parts, stand);
+    out.field = verified.field;
     traction_mpa = [stand, standing = verified.traction_mpa](Vec3d p, Vec3d n) {
       return standing(stand.to_local(p), stand.to_local(n));
     };

@@ -7,9 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 #include <utility>
 
+#include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
 #include "fibrolite/ops/text.h"
 #include "orient.h"
@@ -55,19 +55,14 @@ std::int64_t drop_if(Mesh& mesh, const Test& test) {
 
 // Smallest member of each vertex's connected component.
 std::vector<std::uint32_t> vertex_components(const Mesh& mesh) {
-  std::vector<std::uint32_t> parent(mesh.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto root = [&](std::uint32_t v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const auto& t : mesh.triangles)
-    for (std::size_t i = 1; i < 3; ++i) {
-      const std::uint32_t a = root(t[0]), b = root(t[i]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  for (std::uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
-  return parent;
+  DisjointSets sets(mesh.vertices.size());
+  for (const auto& t : mesh.triangles) {
+    sets.join(t[0], t[1]);
+    sets.join(t[0], t[2]);
+  }
+  std::vector<std::uint32_t> component(sets.size());
+  for (std::uint32_t v = 0; v < component.size(); ++v) component[v] = sets.root(v);
+  return component;
 }
 
 struct Duplicates {

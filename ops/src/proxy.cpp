@@ -4,6 +4,7 @@
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/diameter.h"
+#include "fibrolite/ops/stance.h"
 #include "fibrolite/surface.h"
 #include "fibrolite/to_solid.h"
 
@@ -40,7 +41,8 @@ double coarsest_for(const Box3d& box) {
 
 }  // namespace
 
-Proxy make_proxy(const Mesh& model, const ProxyParams& params, const Context& context) {
+Proxy make_proxy(const Mesh& world, const ProxyParams& params, const Context& context) {
+  const Mesh model = seen_from(params.frame, world);
   if (params.triangles < 1000 || params.triangles > 200000) {
     throw Error(Code::BadRecipe, "the proxy must have 1000 to 200000 triangles", "proxy.triangles", "try 30000");
   }
@@ -53,6 +55,7 @@ Proxy make_proxy(const Mesh& model, const ProxyParams& params, const Context& co
   for (int round = 0;; ++round) {
     context.check();
     Proxy proxy;
+    proxy.frame = params.frame;
     bool last = voxel <= finest * 1.001;
     try {
       proxy.solid =

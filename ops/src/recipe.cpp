@@ -92,12 +92,6 @@ void check_joint(const JointParams& joint) {
 
 }  // namespace
 
-VerifyParams verification(const Recipe& recipe) {
-  VerifyParams params = recipe.verify;
-  params.loads = recipe.loads;
-  return params;
-}
-
 std::vector<std::string> preset_names() {
   std::vector<std::string> names;
   for (const Preset& p : presets) names.emplace_back(p.name);
@@ -122,7 +116,7 @@ double thinnest_mm(const Recipe& recipe, InfillKind infill) {
 void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   const bool hybrid = infill == InfillKind::Hybrid;
   check_material(recipe.material);
-  check_loads(recipe.loads);
+  check_loads(recipe.verify.loads);
   if (hybrid || infill == InfillKind::Tcs) check_tcs(recipe.tcs);
   if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
   if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);

@@ -196,7 +196,7 @@ const std::vector<Field>& table() {
       field("material.yield_mpa", &R::material, &Material::yield_mpa, {0, huge, true}, "yield stress"),
 
       field(
-          "loads", [](auto& recipe) -> auto& { return recipe.loads; }, Range{0, 0},
+          "loads", [](auto& recipe) -> auto& { return recipe.verify.loads; }, Range{0, 0},
           "what the model has to carry; paper-verify: verify.load_n from above and at 45 degrees"),
 
       field(

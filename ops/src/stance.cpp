@@ -24,9 +24,7 @@ Vec3d turned(const Frame& frame, Vec3d direction) {
 template <class Map>
 Box3d mapped(const Box3d& box, Map&& map) {
   Box3d result;
-  for (unsigned corner = 0; corner < 8; ++corner)
-    result.include(map(Vec3d{(corner & 1U) != 0 ? box.max.x : box.min.x, (corner & 2U) != 0 ? box.max.y : box.min.y,
-                             (corner & 4U) != 0 ? box.max.z : box.min.z}));
+  for (unsigned i = 0; i < 8; ++i) result.include(map(box.corner(i)));
   return result;
 }
 

@@ -26,10 +26,7 @@ class Seen final : public Shape::Function {
       : frame_(frame_along({}, to_eye)), pixel_mm_(pixel_mm), layer_mm_(layer_mm) {
     Box3d box;  // in the frame
     const Box3d world = solid.bounds_mm().grown(2 * pixel_mm);
-    for (unsigned corner = 0; corner < 8; ++corner)
-      box.include(frame_.to_local({(corner & 1U) != 0 ? world.max.x : world.min.x,
-                                   (corner & 2U) != 0 ? world.max.y : world.min.y,
-                                   (corner & 4U) != 0 ? world.max.z : world.min.z}));
+    for (unsigned i = 0; i < 8; ++i) box.include(frame_.to_local(world.corner(i)));
     low_ = box.min - Vec3d{0.5 * pixel_mm, 0.5 * pixel_mm, 0};  // samples in the middle of pixels
     width_ = static_cast<std::size_t>(std::ceil(box.size().x / pixel_mm)) + 1;
     height_.assign(width_ * (static_cast<std::size_t>(std::ceil(box.size().y / pixel_mm)) + 1), -far_mm);
@@ -171,10 +168,8 @@ class OnVoxels {
   [[nodiscard]] Shape end(const EndShare& share, Vec3d along) const {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     const Box3d box = solid_.bounds_mm();  // along other directions than x, y, z the corners of the box count
-    for (unsigned corner = 0; corner < 8; ++corner) {
-      const double at =
-          dot(along, {(corner & 1U) != 0 ? box.max.x : box.min.x, (corner & 2U) != 0 ? box.max.y : box.min.y,
-                      (corner & 4U) != 0 ? box.max.z : box.min.z});
+    for (unsigned i = 0; i < 8; ++i) {
+      const double at = dot(along, box.corner(i));
       low = std::min(low, at);
       high = std::max(high, at);
     }
@@ -217,7 +212,7 @@ std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, co
                                      const StrengthParams& params, const Context& context) {
   if (params.coarsen != 0 && params.coarsen != 1 && params.coarsen != 2 && params.coarsen != 4)
     throw Error(Code::BadRecipe, "cells are coarsened by 1, 2 or 4", "coarsen", "use 0 to have it chosen");
-  const VerifyParams verify = verification(recipe);
+  const VerifyParams& verify = recipe.verify;
   const std::vector<LoadCase> cases = load_cases(verify);
   const int coarsen = params.coarsen != 0 ? params.coarsen : choose_coarsening(hybrid.solid, params.most_cells);
   const double cell_mm = coarsen * hybrid.solid.grid().voxel_mm;

@@ -8,7 +8,6 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +16,7 @@
 #include <vector>
 
 #include "child_process.h"
+#include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
 
 namespace fibrolite {
@@ -169,12 +169,7 @@ void keep_inside(Answer& answer, const Input& input) {
   std::sort(sides.begin(), sides.end(),
             [](const Side& a, const Side& b) { return std::tie(a.sorted, a.tet) < std::tie(b.sorted, b.tet); });
 
-  std::vector<std::uint32_t> root(answer.tets.size());
-  std::iota(root.begin(), root.end(), 0U);
-  const auto find = [&](std::uint32_t t) {
-    while (root[t] != t) t = root[t] = root[root[t]];
-    return t;
-  };
+  DisjointSets sets(answer.tets.size());
   std::vector<std::pair<std::uint32_t, bool>> seeds;  // tet beside the surface, on its inner side?
   for (std::size_t first = 0, last = 0; first < sides.size(); first = last) {
     while (last < sides.size() && sides[last].sorted == sides[first].sorted) ++last;
@@ -187,16 +182,16 @@ void keep_inside(Answer& answer, const Input& input) {
         seeds.emplace_back(sides[i].tet, same_turn(sides[i].outward, sides[last - 1].outward));
       }
     } else {
-      root[find(sides[first].tet)] = find(sides[first + 1].tet);
+      sets.join(sides[first].tet, sides[first + 1].tet);
     }
   }
   std::vector<bool> inside(answer.tets.size(), false), outside(answer.tets.size(), false);
-  for (const auto& [tet, inner] : seeds) (inner ? inside : outside)[find(tet)] = true;
+  for (const auto& [tet, inner] : seeds) (inner ? inside : outside)[sets.root(tet)] = true;
 
   std::vector<std::uint32_t> renamed(answer.nodes.size(), of_surface);
   Answer kept;
   for (std::uint32_t t = 0; t < answer.tets.size(); ++t) {
-    const std::uint32_t piece = find(t);
+    const std::uint32_t piece = sets.root(t);
     if (inside[piece] && outside[piece]) fail("TetGen lost a part of the surface");
     if (!inside[piece]) continue;
     Tet tet = answer.tets[t];

@@ -15,6 +15,7 @@
 #include "applied_load.h"
 #include "component_stress.h"
 #include "elasticity.h"
+#include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "fibrolite/ops/text.h"
@@ -217,19 +218,13 @@ void decide(Verdict& verdict, const Candidate& candidate, const std::vector<doub
 
 /// Touching bulk candidates get one number; columns keep their own. Numbers are not yet those of the parts.
 std::vector<std::size_t> merge_bulk(const Partition& partition, const std::vector<Verdict>& verdicts) {
-  std::vector<std::size_t> group(verdicts.size());
-  std::iota(group.begin(), group.end(), std::size_t{0});
-  const auto find = [&](std::size_t i) {
-    while (group[i] != i) i = group[i] = group[group[i]];
-    return i;
-  };
+  DisjointSets sets(verdicts.size());
   for (const Cut& cut : partition.cuts) {
-    const auto a = static_cast<std::size_t>(cut.a), b = static_cast<std::size_t>(cut.b);
-    if (verdicts[a].kind != Kind::Bulk || verdicts[b].kind != Kind::Bulk) continue;
-    const std::size_t ra = find(a), rb = find(b);
-    group[std::max(ra, rb)] = std::min(ra, rb);
+    const auto a = static_cast<std::uint32_t>(cut.a), b = static_cast<std::uint32_t>(cut.b);
+    if (verdicts[a].kind == Kind::Bulk && verdicts[b].kind == Kind::Bulk) sets.join(a, b);
   }
-  for (std::size_t i = 0; i < group.size(); ++i) group[i] = find(i);
+  std::vector<std::size_t> group;
+  for (std::uint32_t i = 0; i < sets.size(); ++i) group.push_back(sets.root(i));
   return group;
 }
 

@@ -202,8 +202,8 @@ constexpr const char* all_loads = R"({"loads": [
 
 TEST(Loads, AreReadAndPrintedWhole) {
   const Recipe recipe = parse_recipe(all_loads, Recipe{}, "x");
-  ASSERT_EQ(recipe.loads.size(), 2U);
-  const LoadCase& clamp = recipe.loads[0];
+  ASSERT_EQ(recipe.verify.loads.size(), 2U);
+  const LoadCase& clamp = recipe.verify.loads[0];
   EXPECT_EQ(clamp.name, "clamp");
   ASSERT_EQ(clamp.supports.size(), 2U);
   EXPECT_EQ(clamp.supports[0].where.lowest->share, 0.1);
@@ -220,8 +220,8 @@ TEST(Loads, AreReadAndPrintedWhole) {
   EXPECT_EQ(std::get<Pressure>(clamp.forces[1]).mpa, 0.25);
   EXPECT_EQ(std::get<Pressure>(clamp.forces[1]).where.label, 2);
   EXPECT_EQ(std::get<Gravity>(clamp.forces[2]).direction.of, Direction::Of::Down);
-  EXPECT_EQ(recipe.loads[1].supports[0].where.lowest->share, 0.05);
-  EXPECT_EQ(std::get<TotalForce>(recipe.loads[1].forces[0]).where.half_spaces.size(), 2U);
+  EXPECT_EQ(recipe.verify.loads[1].supports[0].where.lowest->share, 0.05);
+  EXPECT_EQ(std::get<TotalForce>(recipe.verify.loads[1].forces[0]).where.half_spaces.size(), 2U);
 
   const std::string printed = to_json(recipe);
   EXPECT_EQ(to_json(parse_recipe(printed, Recipe{}, "printed")), printed);
@@ -229,12 +229,12 @@ TEST(Loads, AreReadAndPrintedWhole) {
 }
 
 TEST(Loads, ByNameAndBySet) {
-  EXPECT_EQ(set(Recipe{}, "loads=stand").loads.size(), 1U);
-  EXPECT_EQ(std::get<TotalForce>(set(Recipe{}, "loads=paper-compare").loads.at(0).forces.at(0)).newton, 110);
-  EXPECT_TRUE(set(set(Recipe{}, "loads=stand"), "loads=paper-verify").loads.empty());
+  EXPECT_EQ(set(Recipe{}, "loads=stand").verify.loads.size(), 1U);
+  EXPECT_EQ(std::get<TotalForce>(set(Recipe{}, "loads=paper-compare").verify.loads.at(0).forces.at(0)).newton, 110);
+  EXPECT_TRUE(set(set(Recipe{}, "loads=stand"), "loads=paper-verify").verify.loads.empty());
   EXPECT_EQ(
       set(Recipe{}, R"(loads=[{"name": "a", "supports": [{"where": {"lowest": {}}}], "forces": [{"gravity": "up"}]}])")
-          .loads.size(),
+          .verify.loads.size(),
       1U);
   EXPECT_THAT(refusal_of_set("loads=paper-compar"), HasSubstr("did you mean paper-compare?"));
 }

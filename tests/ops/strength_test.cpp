@@ -38,9 +38,10 @@ Recipe pulled(double newton) {
   recipe.material = {.density_g_cm3 = 1.2, .young_mpa = 2000, .poisson = 0.3, .yield_mpa = 40};
   TotalForce pull{.newton = newton, .direction = {Direction::Of::Up, {}}, .where = {}};
   pull.where.seen_from = Direction{Direction::Of::Up, {}};
-  recipe.loads = {{"pull",
-                   {slides({0, 0, 1}, {0, 0, 0.2}), slides({1, 0, 0}, {-4.8, 0, 0}), slides({0, 1, 0}, {0, -4.8, 0})},
-                   {pull}}};
+  recipe.verify.loads = {
+      {"pull",
+       {slides({0, 0, 1}, {0, 0, 0.2}), slides({1, 0, 0}, {-4.8, 0, 0}), slides({0, 1, 0}, {0, -4.8, 0})},
+       {pull}}};
   return recipe;
 }
 
@@ -72,7 +73,7 @@ TEST(Strength, is_linear_and_coarser_cells_agree) {
 TEST(Strength, its_own_weight_stands_on_its_foot) {
   Recipe recipe;
   recipe.material = {.density_g_cm3 = 1.2, .young_mpa = 2000, .poisson = 0.3, .yield_mpa = 40};
-  recipe.loads = load_preset("stand");
+  recipe.verify.loads = load_preset("stand");
   const auto s = strength(bar(), bar_shape, recipe).front();
   EXPECT_NEAR(s.load_n, 4000 * 1.2e-6 * 9.80665, 0.01 * 4000 * 1.2e-6 * 9.80665);
   // Its top sinks by rho g L^2 / 2E, of the length above the foot.
@@ -92,10 +93,10 @@ TEST(Strength, what_it_cannot_do_it_says) {
   Recipe pressed = pulled(500);
   Pressure pressure{.mpa = 1, .where = {}};
   pressure.where.box_mm = Box3d{{-6, -6, 39}, {6, 6, 41}};
-  pressed.loads[0].forces = {pressure};
+  pressed.verify.loads[0].forces = {pressure};
   EXPECT_THAT(message(pressed), HasSubstr("pressure"));
   Recipe nowhere = pulled(500);
-  std::get<TotalForce>(nowhere.loads[0].forces[0]).where.box_mm = Box3d{{50, 50, 50}, {60, 60, 60}};
+  std::get<TotalForce>(nowhere.verify.loads[0].forces[0]).where.box_mm = Box3d{{50, 50, 50}, {60, 60, 60}};
   EXPECT_NE(message(nowhere), "nothing");
   EXPECT_THAT(message(pulled(500), {.coarsen = 3}), HasSubstr("1, 2 or 4"));
 }

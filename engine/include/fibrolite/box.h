@@ -23,6 +23,10 @@ struct Box3d {
     min = {std::min(min.x, p.x), std::min(min.y, p.y), std::min(min.z, p.z)};
     max = {std::max(max.x, p.x), std::max(max.y, p.y), std::max(max.z, p.z)};
   }
+  /// 0 to 7: bits 0, 1, 2 choose the larger x, y, z.
+  [[nodiscard]] constexpr Vec3d corner(unsigned i) const {
+    return {(i & 1U) != 0 ? max.x : min.x, (i & 2U) != 0 ? max.y : min.y, (i & 4U) != 0 ? max.z : min.z};
+  }
   /// The box with every face moved outward by `mm` (inward if negative).
   [[nodiscard]] constexpr Box3d grown(double mm) const { return {min - Vec3d{mm, mm, mm}, max + Vec3d{mm, mm, mm}}; }
   [[nodiscard]] constexpr bool contains(Vec3d p) const {

@@ -18,6 +18,7 @@ struct Proxy {
   Frame frame{};  ///< Whose coordinates both are given in.
 };
 struct ProxyParams {
+  Frame frame{};          ///< Whose coordinates the proxy is made in: its lattice lies along these axes.
   int triangles = 40000;  ///< Aimed at; up to four times as many where thin limbs would be lost; 1000 to 200000.
 };
 /// The proxy voxel follows from the model's area alone, never from the fine voxel.

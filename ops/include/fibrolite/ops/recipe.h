@@ -32,12 +32,8 @@ struct Recipe {
   TcsParams tcs;
   JointParams joint;
   Material material;
-  std::vector<LoadCase> loads;  ///< Take the place of verify.loads; none: the two cases of `verify`.
   std::uint64_t seed = 1;
 };
-
-/// What verify() takes of a recipe: its numbers, and the load cases.
-[[nodiscard]] VerifyParams verification(const Recipe& recipe);
 
 /// Names for --preset, first is the default.
 [[nodiscard]] std::vector<std::string> preset_names();

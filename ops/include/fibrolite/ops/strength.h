@@ -22,7 +22,7 @@ struct StrengthParams {
 /// of a support or of a loaded face is not counted: that is the clamp's. A force on what is seen from somewhere acts on
 /// the cell faces that look there. @throws Error BadRecipe: an empty selection, named by case and key; Unsupported;
 /// SolverFailed; Cancelled. Cost: see benchmarks/README.md.
-/// The load cases are those of the verification, load_cases(verification(recipe)); a pressure and a selection by label
+/// The load cases are those of the verification, load_cases(recipe.verify); a pressure and a selection by label
 /// are not for solids yet. `body`: distance to the model, to tell shell from infill.
 [[nodiscard]] std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, const Recipe& recipe,
                                                    const StrengthParams& params = {}, const Context& context = {});
