@@ -10,7 +10,6 @@
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
-#include "fibrolite/winding.h"
 #include "job.h"
 #include "options.h"
 #include "summary.h"
@@ -55,12 +54,13 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
 }
 
 /// Shell, joints, then each part in its own colour.
-PointColor colors(const Hybrid& hybrid, const Shape& body, double shell_mm) {
+PointColor colors(const Hybrid& hybrid, double shell_mm) {
   std::vector<Shape> layers_and_columns;
   for (const Joint& joint : hybrid.joints) layers_and_columns.push_back(joint.shape);
   std::vector<Rgb> by_part;
   for (const Part& part : hybrid.parts.parts) by_part.push_back(part_color(part.id(), part.kind() == Kind::Column));
-  return [body, joints = unite(layers_and_columns), labels = hybrid.parts.labels, by_part, shell_mm](Vec3d p) {
+  return [body = hybrid.body, joints = unite(layers_and_columns), labels = hybrid.parts.labels, by_part,
+          shell_mm](Vec3d p) {
     if (body(p) > -shell_mm) return shell_color;
     if (joints(p) <= 0) return joint_color;
     return by_part.at(static_cast<std::size_t>(labels.label(p)));
@@ -90,8 +90,8 @@ void generate(const GenerateOptions& options) {
 
   // Each thing goes as soon as nothing needs it: at the end only the mesh and its check are in memory.
   Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.75, "fill"));
-  const Shape body = options.picture ? distance_to(WindingTree(model.mesh)) : Shape();
   model = {};
+  if (!options.picture) hybrid.body = {};
   stage("write solid", [&] {
     for (const fs::path& file : options.output.files)
       if (is_vdb(file)) write_vdb(outputs.place(file), {{"solid", hybrid.solid}}, context.part(0.75, 0.78, "write"));
@@ -104,7 +104,7 @@ void generate(const GenerateOptions& options) {
       PictureParams view;
       view.up = params.recipe.verify.up;
       write_png(outputs.place(*options.picture),
-                picture(mesh, hybrid.solid, colors(hybrid, body, params.recipe.shell.thickness_mm), view,
+                picture(mesh, hybrid.solid, colors(hybrid, params.recipe.shell.thickness_mm), view,
                         context.part(0.88, 0.92, "picture")));
     });
   }

@@ -63,7 +63,13 @@ std::string strength_table(const std::vector<StrengthReport>& cases) {
   for (const StrengthReport& s : cases)
     rows.push_back({s.load_case, measured(s.load_n), measured(s.failure_load_n), measured(s.safety_factor, 3),
                     measured(s.p99_von_mises_mpa, 3), measured(s.compliance_n_mm), s.weakest});
-  return table(rows) + "\n";
+  std::vector<Row> weak{{"load case", "place", "p99 MPa", "yields at N"}};
+  for (const StrengthReport& s : cases) {
+    for (std::size_t i = 0; i < std::min<std::size_t>(s.places.size(), 6); ++i)
+      weak.push_back({s.load_case, s.places[i].name, measured(s.places[i].p99_von_mises_mpa, 3),
+                      measured(s.places[i].failure_load_n)});
+  }
+  return table(rows) + "\n" + table(weak) + "\n";
 }
 
 /// Warnings and files, and out with it. The outputs are what was asked for, and they are in place: a failing stdout is

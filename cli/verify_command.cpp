@@ -7,7 +7,6 @@
 #include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/strength.h"
 #include "fibrolite/ops/stress_field.h"
-#include "fibrolite/winding.h"
 #include "job.h"
 #include "options.h"
 #include "summary.h"
@@ -68,8 +67,7 @@ StressField judge_solid(const VerifyOptions& options, const Model& model, const 
   report.infill = name_of(options.infill);
   Stopwatch stage(report.stages);
   report.strength = stage("strength", [&] {
-    return strength(hybrid, distance_to(WindingTree(model.mesh)), recipe, {.coarsen = options.coarsen},
-                    context.part(0.5, 1, "strength"));
+    return strength(hybrid, recipe, {.coarsen = options.coarsen}, context.part(0.5, 1, "strength"));
   });
   return std::move(hybrid.field);
 }

@@ -227,12 +227,12 @@ VoxelFemResult solve(const VoxelFemProblem& problem, const Context& context) {
     largest = std::max(largest, u[i] * u[i] + u[i + 1] * u[i + 1] + u[i + 2] * u[i + 2]);
   }
   result.max_displacement_mm = std::sqrt(largest);
-  const StressSummary stress =
-      measure_stress(model, impl->element, problem.young_mpa, problem.poisson, u, problem.unmeasured, context);
-  result.max_von_mises_mpa = stress.max_mpa;
-  result.p99_von_mises_mpa = stress.p99_mpa;
-  result.peak_von_mises_mpa = stress.peak_mpa;
-  result.weakest_mm = stress.weakest_mm;
+  StressSummary stress = measure_stress(model, impl->element, problem, u, context);
+  result.max_von_mises_mpa = stress.whole.max_von_mises_mpa;
+  result.p99_von_mises_mpa = stress.whole.p99_von_mises_mpa;
+  result.peak_von_mises_mpa = stress.whole.peak_von_mises_mpa;
+  result.weakest_mm = stress.whole.weakest_mm;
+  result.places = std::move(stress.places);
   if (!std::isfinite(result.compliance_n_mm + result.max_displacement_mm + result.max_von_mises_mpa)) {
     throw Error(Code::SolverFailed, "the loads are too large for the stiffness", {}, "check the units");
   }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "fibrolite/context.h"
-#include "fibrolite/shape.h"
 #include "fibrolite/stress.h"
+#include "fibrolite/voxel_fem.h"
 #include "voxel_element.h"
 #include "voxel_model.h"
 
@@ -20,13 +20,13 @@ using CellStress = StressTensor;
                                      double poisson, const std::vector<double>& u, const std::uint32_t* table, int low);
 
 struct StressSummary {
-  double max_mpa = 0, p99_mpa = 0, peak_mpa = 0;
-  Vec3d weakest_mm{};
+  PlaceStress whole;
+  std::vector<PlaceStress> places;
 };
-/// Over cells of at least half the fraction of the fullest cell whose centre is not in `unmeasured`. Cost: O(cells),
-/// parallel; the same bits on any number of threads. @throws Error Cancelled.
-[[nodiscard]] StressSummary measure_stress(const VoxelModel& model, const VoxelElement& element, double young_mpa,
-                                           double poisson, const std::vector<double>& u, const Shape& unmeasured,
+/// Over cells of at least half the fraction of the fullest cell whose centre is not in problem.unmeasured. Cost:
+/// O(cells log cells), parallel; the same bits on any number of threads. @throws Error Cancelled.
+[[nodiscard]] StressSummary measure_stress(const VoxelModel& model, const VoxelElement& element,
+                                           const VoxelFemProblem& problem, const std::vector<double>& u,
                                            const Context& context);
 
 }  // namespace fibrolite

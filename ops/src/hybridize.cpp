@@ -48,18 +48,18 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
 
   // Interiors and joints (paper Sec. 5 and 6), as distance functions.
   const bool sections = params.infill == InfillKind::Hybrid || params.infill == InfillKind::Mfs;
-  if (sections) out.body = distance_to(WindingTree(model.mesh));
+  const Shape model_distance = sections ? distance_to(WindingTree(model.mesh)) : Shape();
   std::vector<Fill> fills;
   run("infill", 0.40, [&](const Context&) {
-    for (const Part& part : out.parts.parts) fills.push_back(fill(part, params.infill, recipe, out.body));
+    for (const Part& part : out.parts.parts) fills.push_back(fill(part, params.infill, recipe, model_distance));
   });
   std::vector<double> demand_n;
   run("joints", 0.45, [&](const Context& c) {
     if (!recipe.joint.enabled || out.parts.parts.size() < 2) return;
-    out.interfaces = interfaces(out.parts, out.body, section_pixel(recipe), c);
-    out.joints = join_all(out.parts, out.interfaces, fills, recipe, out.body, c);
+    out.interfaces = interfaces(out.parts, model_distance, section_pixel(recipe), c);
+    out.joints = join_all(out.parts, out.interfaces, fills, recipe, model_distance, c);
     for (const Interface& i : out.interfaces)
-      demand_n.push_back(fibrolite::demand_n(i, out.parts.labels, out.body, traction_mpa));
+      demand_n.push_back(fibrolite::demand_n(i, out.parts.labels, model_distance, traction_mpa));
   });
 
   // One composed shape, made into voxels once, in one piece.
@@ -71,7 +71,8 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     return made.solid;
   });
   const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
-  const Shape whole = compose(distance_to(body), out.parts, fills, out.joints, params.infill, assembly);
+  out.body = distance_to(body);
+  const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, assembly);
   const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
     return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm}, c);

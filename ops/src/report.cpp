@@ -105,7 +105,18 @@ Json to_json(const MeshCheck& mesh) {
           {"shells", mesh.shells}};
 }
 
+Json to_json(const PlaceReport& place) {
+  return {{"place", place.name},
+          {"volume_mm3", place.volume_mm3},
+          {"max_von_mises_mpa", place.max_von_mises_mpa},
+          {"p99_von_mises_mpa", place.p99_von_mises_mpa},
+          {"failure_load_n", place.failure_load_n},
+          {"weakest_mm", list(place.weakest_mm)}};
+}
+
 Json to_json(const StrengthReport& s) {
+  Json places = Json::array();
+  for (const PlaceReport& place : s.places) places.push_back(to_json(place));
   return {{"load_case", s.load_case},
           {"load_n", s.load_n},
           {"compliance_nmm", s.compliance_n_mm},
@@ -116,6 +127,7 @@ Json to_json(const StrengthReport& s) {
           {"safety_factor", s.safety_factor},
           {"weakest_mm", list(s.weakest_mm)},
           {"weakest", s.weakest},
+          {"places", places},
           {"cells", s.cells},
           {"cell_mm", s.cell_mm},
           {"iterations", s.iterations},

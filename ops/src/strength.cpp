@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <span>
 
 #include "applied_load.h"
 #include "fibrolite/blocks.h"
@@ -17,6 +18,8 @@
 
 namespace fibrolite {
 namespace {
+
+constexpr std::int64_t least_cells = 100;  // of fewer, one in a hundred is none
 
 /// What is seen first from a direction: the heights of the material along it, one per pixel across it. Negative on the
 /// topmost layer of each pixel, as thick as `layer_mm`.
@@ -184,16 +187,59 @@ class OnVoxels {
   double load_n_ = 0;
 };
 
-std::string whose(const Hybrid& hybrid, const Recipe& recipe, const Shape& body, Vec3d p) {
-  const double voxel = hybrid.solid.grid().voxel_mm;
-  for (std::size_t i = 0; i < hybrid.joints.size(); ++i)
-    if (hybrid.joints[i].shape(p) < voxel)
-      return "joint " + std::to_string(i) + " between parts " + std::to_string(hybrid.interfaces[i].a) + " and " +
-             std::to_string(hybrid.interfaces[i].b);
-  const Part& part = hybrid.parts.parts[static_cast<std::size_t>(hybrid.parts.labels.label(p))];
-  const bool in_shell = body(p) > -recipe.shell.thickness_mm;
-  return std::string(in_shell ? "shell" : "infill") + " of part " + std::to_string(part.id()) + " (" +
-         name(part.kind()) + ")";
+/// Of what a point is: a joint, or a part's shell or infill.
+class Places {
+ public:
+  Places(const Hybrid& hybrid, double shell_mm) : hybrid_(hybrid), shell_mm_(shell_mm) {}
+
+  void operator()(std::span<const Vec3d> points, std::span<std::uint16_t> place) const {
+    Box3d box;
+    for (const Vec3d p : points) box.include(p);
+    std::vector<float> distance(points.size());
+    hybrid_.body.evaluate(points, distance);
+    const auto first_of_parts = static_cast<std::uint16_t>(hybrid_.joints.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const int infill = static_cast<double>(distance[i]) > -shell_mm_ ? 0 : 1;
+      place[i] = static_cast<std::uint16_t>(first_of_parts + 2 * hybrid_.parts.labels.label(points[i]) + infill);
+    }
+    for (std::size_t j = hybrid_.joints.size(); j-- > 0;) {  // where joints meet, the first of them
+      const Shape& joint = hybrid_.joints[j].shape;
+      if (joint.bound(box).lo > 0) continue;
+      joint.evaluate(points, distance);
+      for (std::size_t i = 0; i < points.size(); ++i)
+        if (distance[i] < 0) place[i] = static_cast<std::uint16_t>(j);
+    }
+  }
+  [[nodiscard]] std::string name(std::uint16_t place) const {
+    const std::size_t joints = hybrid_.joints.size();
+    if (place < joints) {
+      const Interface& between = hybrid_.interfaces[place];
+      return "joint " + std::to_string(place) + " between parts " + std::to_string(between.a) + " and " +
+             std::to_string(between.b);
+    }
+    const Part& part = hybrid_.parts.parts[(place - joints) / 2];
+    return std::string((place - joints) % 2 == 0 ? "shell" : "infill") + " of part " + std::to_string(part.id()) +
+           " (" + fibrolite::name(part.kind()) + ")";
+  }
+
+ private:
+  const Hybrid& hybrid_;
+  const double shell_mm_;
+};
+
+/// Weakest first.
+std::vector<PlaceReport> places_of(const VoxelFemResult& solved, const Places& places, double yield_mpa,
+                                   double load_n) {
+  std::vector<PlaceReport> list;
+  for (const PlaceStress& stress : solved.places) {
+    if (stress.cells < least_cells) continue;
+    list.push_back({places.name(stress.place), stress.volume_mm3, stress.max_von_mises_mpa, stress.p99_von_mises_mpa,
+                    load_n * yield_mpa / stress.p99_von_mises_mpa, stress.weakest_mm});
+  }
+  std::stable_sort(list.begin(), list.end(), [](const PlaceReport& a, const PlaceReport& b) {
+    return a.p99_von_mises_mpa > b.p99_von_mises_mpa;
+  });
+  return list;
 }
 
 /// Cells with material at most: what the finest grid has, less by the cube of the coarsening.
@@ -208,14 +254,15 @@ int choose_coarsening(const Solid& solid, std::int64_t most_cells) {
 
 }  // namespace
 
-std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, const Recipe& recipe,
-                                     const StrengthParams& params, const Context& context) {
+std::vector<StrengthReport> strength(const Hybrid& hybrid, const Recipe& recipe, const StrengthParams& params,
+                                     const Context& context) {
   if (params.coarsen != 0 && params.coarsen != 1 && params.coarsen != 2 && params.coarsen != 4)
     throw Error(Code::BadRecipe, "cells are coarsened by 1, 2 or 4", "coarsen", "use 0 to have it chosen");
   const VerifyParams& verify = recipe.verify;
   const std::vector<LoadCase> cases = load_cases(verify);
   const int coarsen = params.coarsen != 0 ? params.coarsen : choose_coarsening(hybrid.solid, params.most_cells);
   const double cell_mm = coarsen * hybrid.solid.grid().voxel_mm;
+  const Places places(hybrid, recipe.shell.thickness_mm);
   std::vector<StrengthReport> result;
   for (std::size_t c = 0; c < cases.size(); ++c) {
     const auto share = [&](std::size_t i) { return static_cast<double>(i) / static_cast<double>(cases.size()); };
@@ -223,6 +270,7 @@ std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, co
     VoxelFemProblem problem = voxels.problem(cases[c]);
     problem.coarsen = coarsen;
     problem.residual = params.residual;
+    problem.place_of = places;
     const VoxelFemResult solved = solve(problem, context.part(share(c), share(c + 1), cases[c].name));
     StrengthReport& answer = result.emplace_back();
     answer.load_case = cases[c].name;
@@ -233,8 +281,11 @@ std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, co
     answer.p99_von_mises_mpa = solved.p99_von_mises_mpa;
     answer.safety_factor = recipe.material.yield_mpa / solved.p99_von_mises_mpa;
     answer.failure_load_n = answer.load_n * answer.safety_factor;
-    answer.weakest_mm = solved.weakest_mm;
-    answer.weakest = whose(hybrid, recipe, body, solved.weakest_mm);
+    answer.places = places_of(solved, places, recipe.material.yield_mpa, answer.load_n);
+    if (!answer.places.empty()) {
+      answer.weakest = answer.places.front().name;
+      answer.weakest_mm = answer.places.front().weakest_mm;
+    }
     answer.cells = solved.cells;
     answer.cell_mm = cell_mm;
     answer.iterations = solved.iterations;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "fibrolite/box.h"
@@ -43,6 +44,17 @@ struct VoxelFemProblem {
   double residual = 1e-6;                        ///< Asked for; in [1e-12, 0.1].
   int max_iterations = 500;                      ///< > 0.
   Shape unmeasured;  ///< Cells whose centre is in here give no stress: clamps, load patches.
+  /// Which place each point belongs to, to have the stress of each; empty: no places. Pure.
+  std::function<void(std::span<const Vec3d> points, std::span<std::uint16_t> place)> place_of;
+};
+
+/// Stress of the measured cells of one place.
+struct PlaceStress {
+  std::uint16_t place = 0;
+  std::int64_t cells = 0;
+  double volume_mm3 = 0;                                                        ///< Of their material.
+  double max_von_mises_mpa = 0, p99_von_mises_mpa = 0, peak_von_mises_mpa = 0;  ///< As of the whole, below.
+  Vec3d weakest_mm{};                                                           ///< Of the peak.
 };
 
 /// What a solid does under its loads. Displacement is trilinear between the nodes of cells. Stress is that of the
@@ -59,11 +71,12 @@ class VoxelFemResult {
   double residual = 0;         ///< |f - K u| / |f| over the free components, in double precision.
   double compliance_n_mm = 0;  ///< Load times displacement: twice the work the loads do.
   double max_displacement_mm = 0;
-  Vec3d load_n{}, reaction_n{};   ///< Sums; in equilibrium they cancel.
-  double max_von_mises_mpa = 0;   ///< Of any measured cell. Grows without limit at re-entrant edges as voxels shrink.
-  double p99_von_mises_mpa = 0;   ///< 99 % of the measured material is at or below this.
-  double peak_von_mises_mpa = 0;  ///< Largest after averaging stress over the cells around each node, then each cell.
-  Vec3d weakest_mm{};             ///< Centre of the cell of that peak.
+  Vec3d load_n{}, reaction_n{};     ///< Sums; in equilibrium they cancel.
+  double max_von_mises_mpa = 0;     ///< Of any measured cell. Grows without limit at re-entrant edges as voxels shrink.
+  double p99_von_mises_mpa = 0;     ///< 99 % of the measured material is at or below this.
+  double peak_von_mises_mpa = 0;    ///< Largest after averaging stress over the cells around each node, then each cell.
+  Vec3d weakest_mm{};               ///< Centre of the cell of that peak.
+  std::vector<PlaceStress> places;  ///< Of all measured cells, by place, rising.
 
   /// Displacement at a point of a cell with material, mm; none elsewhere. Cost: O(log blocks).
   [[nodiscard]] std::optional<Vec3d> displacement_mm(Vec3d p) const;

@@ -33,7 +33,7 @@ struct Hybrid {
   /// If asked for: body, shell, fill_<part>, joint_<n>, ties, specks (removed), pores (filled), solid. The union of
   /// shell, fills, joints, ties and pores less the specks is the solid.
   std::vector<NamedSolid> steps;
-  Shape body;         ///< Distance to the model, for pictures; of infills that need no sections: nothing.
+  Shape body;         ///< Distance to the model, as far in as the shell goes.
   StressField field;  ///< If recipe.verify.keep_field, of a hybrid.
 };
 /// Model -> printed solid. Fills in everything of `report` but the mesh block.

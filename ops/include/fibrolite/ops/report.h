@@ -64,6 +64,14 @@ struct VerificationReport {
   std::vector<Selected> selected;        ///< What supports and forces got hold of.
 };
 /// What the finished solid carries under one load case (strength.h).
+/// Stress in one place of the printed solid: a joint, or the shell or the infill of a part.
+struct PlaceReport {
+  std::string name;
+  double volume_mm3 = 0;  ///< Of its material that was measured.
+  double max_von_mises_mpa = 0, p99_von_mises_mpa = 0;
+  double failure_load_n = 0;  ///< load * yield / p99 of this place.
+  Vec3d weakest_mm{};
+};
 struct StrengthReport {
   std::string load_case;
   double load_n = 0, compliance_n_mm = 0, max_displacement_mm = 0;
@@ -71,7 +79,8 @@ struct StrengthReport {
   double failure_load_n = 0;  ///< load * yield / p99.
   double safety_factor = 0;   ///< yield / p99.
   Vec3d weakest_mm{};
-  std::string weakest;
+  std::string weakest;              ///< The first of `places`.
+  std::vector<PlaceReport> places;  ///< Of 100 cells or more; the one that yields first, first.
   std::int64_t cells = 0;
   double cell_mm = 0;
   int iterations = 0;

@@ -23,8 +23,8 @@ struct StrengthParams {
 /// the cell faces that look there. @throws Error BadRecipe: an empty selection, named by case and key; Unsupported;
 /// SolverFailed; Cancelled. Cost: see benchmarks/README.md.
 /// The load cases are those of the verification, load_cases(recipe.verify); a pressure and a selection by label
-/// are not for solids yet. `body`: distance to the model, to tell shell from infill.
-[[nodiscard]] std::vector<StrengthReport> strength(const Hybrid& hybrid, const Shape& body, const Recipe& recipe,
+/// are not for solids yet.
+[[nodiscard]] std::vector<StrengthReport> strength(const Hybrid& hybrid, const Recipe& recipe,
                                                    const StrengthParams& params = {}, const Context& context = {});
 
 }  // namespace fibrolite
