@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // verify: parts by shape, judged by finite elements; the stresses as files for other programs.
+#include <cmath>
 #include <limits>
 #include <memory>
 
@@ -7,6 +8,7 @@
 #include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/strength.h"
 #include "fibrolite/ops/stress_field.h"
+#include "fibrolite/ops/text.h"
 #include "job.h"
 #include "options.h"
 #include "summary.h"
@@ -69,6 +71,13 @@ StressField judge_solid(const VerifyOptions& options, const Model& model, const 
   report.strength = stage("strength", [&] {
     return strength(hybrid, recipe, {.coarsen = options.coarsen}, context.part(0.5, 1, "strength"));
   });
+  if (const double thinnest = thinnest_mm(recipe, options.infill), cell = report.strength.front().cell_mm;
+      thinnest < 5 * cell) {
+    const double across = thinnest / cell;
+    report.warnings.push_back("the thinnest members are " + number_text(across) + " cells thick: they bend about " +
+                              number_text(std::round(130 / (across * across))) +
+                              " % too little; compare solids at the same cell, or take a finer --voxel");
+  }
   return std::move(hybrid.field);
 }
 

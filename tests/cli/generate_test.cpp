@@ -292,6 +292,13 @@ TEST(Verify, ThePrintedSolidFailsSomewhere) {
   EXPECT_LT(answer["residual"], 1e-6);
   EXPECT_THAT(answer["weakest"], HasSubstr("part"));
   EXPECT_THAT(finished.out, HasSubstr("breaks first"));
+  EXPECT_THAT(finished.out, HasSubstr("the thinnest members are 2 cells thick"));
+  // Every place has its own, the weakest first.
+  const json& places = answer["places"];
+  ASSERT_GE(places.size(), 2U);
+  EXPECT_EQ(answer["weakest"], places[0]["place"]);
+  for (std::size_t i = 1; i < places.size(); ++i)
+    EXPECT_GE(places[i]["failure_load_n"], places[i - 1]["failure_load_n"]);
 }
 
 TEST(Check, TellsAClosedMeshFromAnOpenOne) {

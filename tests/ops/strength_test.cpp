@@ -4,8 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "elasticity.h"
 #include "fibrolite/error.h"
+#include "fibrolite/ops/infill/tcs.h"
+#include "fibrolite/ops/tetrahedralize.h"
 #include "fibrolite/realize.h"
+#include "fibrolite/surface.h"
+#include "fibrolite/voxel_fem.h"
 #include "models.h"
 
 namespace fibrolite {
@@ -109,6 +114,59 @@ TEST(Strength, what_it_cannot_do_it_says) {
   std::get<TotalForce>(nowhere.verify.loads[0].forces[0]).where.box_mm = Box3d{{50, 50, 50}, {60, 60, 60}};
   EXPECT_NE(message(nowhere), "nothing");
   EXPECT_THAT(message(pulled(500), {.coarsen = 3}), HasSubstr("1, 2 or 4"));
+}
+
+/// 2 x 2 x 2 cells of crystal between plates of 1 mm.
+Shape sandwich() {
+  const Shape crystal_block =
+      intersect({crystal({.cell_mm = 6, .stick_mm = 1.2, .ball_mm = 1.8, .shift_mm = {1, 1, 1}}),
+                 cuboid({{0, 0, 0}, {12, 12, 12}})});
+  return unite({crystal_block, cuboid({{0, 0, -1}, {12, 12, 0.2}}), cuboid({{0, 0, 11.8}, {12, 12, 13}})});
+}
+
+/// Displacement under the load per newton, the upper plate pressed down by its weight, on tetrahedra.
+double compliance_on_tets(const Material& material) {
+  const Box3d box{{-1, -1, -2}, {13, 13, 14}};
+  const TetMesh mesh = tetrahedralize(surface(realize(sandwich(), box, Grid{.voxel_mm = 0.25})), {.radius_edge = 2});
+  std::vector<fem::Fixed> fixed;
+  for (std::uint32_t n = 0; n < mesh.nodes.size(); ++n)
+    for (int axis = 0; axis < 3; ++axis)
+      if (mesh.nodes[n].z < -0.9) fixed.push_back({n, axis});
+  fem::LoadCase load;
+  load.force_n.resize(mesh.nodes.size());
+  double newton = 0;
+  for (const auto& tet : mesh.tets) {
+    const Vec3d a = mesh.nodes[tet[0]], b = mesh.nodes[tet[1]], c = mesh.nodes[tet[2]], d = mesh.nodes[tet[3]];
+    if ((a.z + b.z + c.z + d.z) / 4 < 12) continue;
+    const double volume = dot(b - a, cross(c - a, d - a)) / 6;
+    newton += volume;  // of a constant body force a corner takes -1/20, the middle of an edge 1/5
+    for (std::size_t k = 0; k < 10; ++k) load.force_n[tet[k]].z += volume * (k < 4 ? 0.05 : -0.2);
+  }
+  const auto solved = fem::solve(mesh, material, fixed, {load}).front();
+  double work = 0;
+  for (std::size_t n = 0; n < mesh.nodes.size(); ++n) work += dot(load.force_n[n], solved.displacement_mm[n]);
+  return work / (newton * newton);
+}
+
+double compliance_on_voxels(const Material& material, double voxel_mm) {
+  const Box3d box{{-1, -1, -2}, {13, 13, 14}};
+  VoxelFemProblem problem;
+  problem.solid = realize(sandwich(), box, Grid{.voxel_mm = voxel_mm});
+  problem.young_mpa = material.young_mpa;
+  problem.poisson = material.poisson;
+  problem.supports.push_back({.where = half_space({0, 0, -0.9}, {0, 0, 1}), .displacement_mm = {}});
+  problem.body_force_n_mm3 = [](Vec3d p) { return Vec3d{0, 0, p.z < 12 ? 0.0 : -1.0}; };
+  const VoxelFemResult solved = solve(problem);
+  return solved.compliance_n_mm / (solved.load_n.z * solved.load_n.z);
+}
+
+/// Two methods that share no line: surface, TetGen and ten-node tetrahedra; samples and cubes.
+TEST(Strength, tetrahedra_and_voxels_agree_on_a_crystal) {
+  const Material material{.density_g_cm3 = 1.2, .young_mpa = 2000, .poisson = 0.35, .yield_mpa = 40};
+  const double tets = compliance_on_tets(material);
+  const double voxels = compliance_on_voxels(material, 0.2);
+  EXPECT_NEAR(voxels, tets, 0.05 * tets);
+  EXPECT_LT(voxels, tets) << "six voxels to a stick: too stiff by about 1.3 / 36";
 }
 
 }  // namespace
