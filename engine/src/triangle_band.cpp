@@ -42,7 +42,7 @@ constexpr float voxels_per_turn = 4;
 
 Coord cells_to_samples(int x, int y, int z) { return {x * cell_size, y * cell_size, z * cell_size}; }
 
-enum Side : int { inside = -1, crossed = 0, outside = 1 };
+enum Side : int { Inside = -1, Crossed = 0, Outside = 1 };
 
 struct Tile {
   Coord origin;
@@ -105,27 +105,27 @@ class Builder {
     return slope;
   }
 
-  /// The side of a block that no triangle crosses; `crossed` if the winding number may pass 1/2 within it.
+  /// The side of a block that no triangle crosses; `Crossed` if the winding number may pass 1/2 within it.
   [[nodiscard]] Side side_by_winding(Vec3d p_vox, double radius, Cell& result) const {
     const double w = winding_.winding(params_.voxel_mm * p_vox);
     result.overlap = result.overlap || w > 1.5 || w < -0.5;
-    if (!topology_.closed() && std::abs(w - 0.5) <= winding_slope(p_vox, radius) * radius + 0.02) return crossed;
-    return w > 0.5 ? inside : outside;
+    if (!topology_.closed() && std::abs(w - 0.5) <= winding_slope(p_vox, radius) * radius + 0.02) return Crossed;
+    return w > 0.5 ? Inside : Outside;
   }
 
-  /// By the closest feature; `crossed` if it has no normal.
+  /// By the closest feature; `Crossed` if it has no normal.
   [[nodiscard]] Side side_by_normal(const TriangleFrame& t, Vec3f p) const {
     const ClosestFeature f = closest_feature(t, p);
     const auto i = static_cast<std::size_t>(f.index);
     Vec3f normal{t.n[0], t.n[1], t.n[2]};
-    if (f.kind == ClosestFeature::edge) normal = topology_.edge_normals[t.triangle][i];
-    if (f.kind == ClosestFeature::vertex) {
+    if (f.kind == ClosestFeature::Edge) normal = topology_.edge_normals[t.triangle][i];
+    if (f.kind == ClosestFeature::Vertex) {
       normal = topology_.vertex_normals[topology_.weld.id[mesh_.triangles[t.triangle][i]]];
     }
     const auto squared = [](Vec3f v) { return v.x * v.x + v.y * v.y + v.z * v.z; };
     const float along = f.offset.x * normal.x + f.offset.y * normal.y + f.offset.z * normal.z;
-    if (!(along * along > 1e-8F * squared(f.offset) * squared(normal))) return crossed;
-    return along > 0 ? outside : inside;
+    if (!(along * along > 1e-8F * squared(f.offset) * squared(normal))) return Crossed;
+    return along > 0 ? Outside : Inside;
   }
 
   // ---- cells ----
@@ -214,8 +214,8 @@ class Builder {
     const Vec3d center{job.origin.x() + half, job.origin.y() + half, job.origin.z() + half};
     if (job.count == 0) {
       const Side side = side_by_winding(center, half * std::numbers::sqrt3, result);
-      if (side == inside) result.inner.push_back({job.origin, job.size});
-      if (side != crossed) return;
+      if (side == Inside) result.inner.push_back({job.origin, job.size});
+      if (side != Crossed) return;
       if (job.size > cell_size) {
         for (int k = 0; k < 8; ++k) {
           fill_cell({job.origin + cells_to_samples(k >> 2, k >> 1 & 1, k & 1), cell_size, 0, 0}, by_winding, scratch,
@@ -234,7 +234,7 @@ class Builder {
       scratch.all.push_back(static_cast<std::uint32_t>(i));
     }
     const Block block{center, job.origin + Coord(cell_size / 2), by_winding, scratch, result};
-    split(block, {}, cell_size, crossed, scratch.all.data(), static_cast<int>(job.count),
+    split(block, {}, cell_size, Crossed, scratch.all.data(), static_cast<int>(job.count),
           reach_crossed_ + search_margin);
   }
 
@@ -269,7 +269,7 @@ class Builder {
     for (int k = 0; k < 8; ++k) {
       const float d = std::sqrt(c.nearest.d2[k]);
       c.side[k] = side;
-      if (side == crossed && d > radius) {
+      if (side == Crossed && d > radius) {
         const Vec3f p{c.boxes.x[k], c.boxes.y[k], c.boxes.z[k]};
         const Vec3d world = block.cell_center + to_double(p);
         // The list holds all triangles within reach of the parent, so the nearest one is known this far from the
@@ -278,11 +278,11 @@ class Builder {
         if (!block.by_winding && known) {
           c.side[k] = side_by_normal(block.scratch.frames[static_cast<std::size_t>(c.nearest.frame[k])], p);
         }
-        if (c.side[k] == crossed) c.side[k] = side_by_winding(world, radius, block.result);
+        if (c.side[k] == Crossed) c.side[k] = side_by_winding(world, radius, block.result);
       }
-      const float band = c.side[k] == outside ? params_.outside_vox : params_.inside_vox;
+      const float band = c.side[k] == Outside ? params_.outside_vox : params_.inside_vox;
       const float margin = child >= 16 ? search_margin : 0.0F;
-      c.reach[k] = c.side[k] == crossed ? reach_crossed_ + margin : d - radius > band ? -1.0F : band;
+      c.reach[k] = c.side[k] == Crossed ? reach_crossed_ + margin : d - radius > band ? -1.0F : band;
     }
     std::vector<std::uint32_t>& room = block.scratch.lists[size == 64 ? 0 : size == 32 ? 1 : size == 16 ? 2 : 3];
     const auto n = static_cast<std::size_t>(count) + 1;  // cull writes one past what it keeps
@@ -303,8 +303,8 @@ class Builder {
         return static_cast<int>(std::lround(x - c.boxes.half + 0.5F * (cell_size - 1))) - cell_size / 2;
       };
       const Coord origin = block.cell_middle + Coord(low(p.x), low(p.y), low(p.z));
-      if (c.side[k] != crossed && c.counts[k] == 0) {
-        if (c.side[k] == inside) block.result.inner.push_back({origin, child});
+      if (c.side[k] != Crossed && c.counts[k] == 0) {
+        if (c.side[k] == Inside) block.result.inner.push_back({origin, child});
       } else if (child > 8) {
         split(block, p, child, c.side[k], c.lists[k], c.counts[k], c.reach[k]);
       } else {
@@ -320,7 +320,7 @@ class Builder {
     alignas(32) float values[Leaf::SIZE];  // voxels
     Children c;
     divide(block, center, Leaf::DIM, side, list, count, reach, c);
-    const bool winding = block.by_winding && side == crossed;
+    const bool winding = block.by_winding && side == Crossed;
     for (int k = 0; k < 8; ++k) {
       const int at = ((k >> 2) * 64 + (k >> 1 & 1) * 8 + (k & 1)) * 4;
       const Side child = c.side[k];
@@ -332,14 +332,14 @@ class Builder {
         float value = std::sqrt(d2[i]);
         if (!winding) {
           Side sample = child;
-          if (child == crossed) {
+          if (child == Crossed) {
             const Vec3f p{corner.x + static_cast<float>(i >> 4), corner.y + static_cast<float>(i >> 2 & 3),
                           corner.z + static_cast<float>(i & 3)};
-            sample = value < rounding_vox ? outside
+            sample = value < rounding_vox ? Outside
                                           : side_by_normal(block.scratch.frames[static_cast<std::size_t>(frame[i])], p);
-            if (sample == crossed) sample = inside_by_winding(block.cell_center + to_double(p)) ? inside : outside;
+            if (sample == Crossed) sample = inside_by_winding(block.cell_center + to_double(p)) ? Inside : Outside;
           }
-          if (sample == inside) value = -value;
+          if (sample == Inside) value = -value;
         }
         values[at + (i >> 4) * 64 + (i >> 2 & 3) * 8 + (i & 3)] = value;
       }

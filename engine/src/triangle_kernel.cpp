@@ -90,13 +90,13 @@ ClosestFeature closest_feature(const TriangleFrame& t, Vec3f p) {
     }
   }
   Vec3f offset{h * t.n[0], h * t.n[1], h * t.n[2]};
-  if (inside) return {ClosestFeature::face, 0, offset};
+  if (inside) return {ClosestFeature::Face, 0, offset};
   const float *out = t.out[best], *along = t.along[best];
   offset = {offset.x + e[best] * out[0] + x[best] * along[0], offset.y + e[best] * out[1] + x[best] * along[1],
             offset.z + e[best] * out[2] + x[best] * along[2]};
-  if (x[best] > 0) return {ClosestFeature::vertex, (best + 1) % 3, offset};
-  if (x[best] < 0) return {ClosestFeature::vertex, best, offset};
-  return {ClosestFeature::edge, best, offset};
+  if (x[best] > 0) return {ClosestFeature::Vertex, (best + 1) % 3, offset};
+  if (x[best] < 0) return {ClosestFeature::Vertex, best, offset};
+  return {ClosestFeature::Edge, best, offset};
 }
 
 void nearest_to_centers(const TriangleFrame* frames, const std::uint32_t* list, int count, const EightBoxes& boxes,

@@ -28,7 +28,7 @@ struct TriangleFrame {
 
 /// Where the point of a triangle closest to p lies, and the vector from there to p.
 struct ClosestFeature {
-  enum Kind : std::uint8_t { face, edge, vertex } kind;
+  enum Kind : std::uint8_t { Face, Edge, Vertex } kind;
   int index;  ///< Edge i runs from corner i to corner i + 1.
   Vec3f offset;
 };

@@ -97,7 +97,8 @@ VoxelAggregates::VoxelAggregates(const VoxelOperator& fine) : fine_(fine) {
     if (of_node_[i] == none) continue;
     ++begin_[of_node_[i] + 1];
     Vec3d& c = centre_[of_node_[i]];
-    c = c + Vec3d{1.0 * (place_[i] / 9), 1.0 * (place_[i] / 3 % 3), 1.0 * (place_[i] % 3)};
+    const int x = place_[i] / 9, y = place_[i] / 3 % 3, z = place_[i] % 3;
+    c = c + Vec3d{1.0 * x, 1.0 * y, 1.0 * z};
   }
   for (std::size_t g = 0; g < next; ++g) {
     const Vec3i box = box_[g];
@@ -121,10 +122,7 @@ void VoxelAggregates::to_nodes(const float* c, float* u) const {
         continue;
       }
       const float* m = c + std::size_t{6} * g;
-      const int place = place_[i];
-      const auto x = static_cast<float>(3 * box_[g].x + place / 9 - centre_[g].x);
-      const auto y = static_cast<float>(3 * box_[g].y + place / 3 % 3 - centre_[g].y);
-      const auto z = static_cast<float>(3 * box_[g].z + place % 3 - centre_[g].z);
+      const auto [x, y, z] = from_centre(i, g);
       to[0] = m[0] + m[4] * z - m[5] * y;
       to[1] = m[1] + m[5] * x - m[3] * z;
       to[2] = m[2] + m[3] * y - m[4] * x;
@@ -141,10 +139,7 @@ void VoxelAggregates::from_nodes(const float* f, float* c) const {
       for (std::uint32_t k = begin_[g]; k < begin_[g + 1]; ++k) {
         const std::uint32_t i = node_[k];
         const float* v = f + std::size_t{3} * i;
-        const int place = place_[i];
-        const auto x = static_cast<float>(3 * box_[g].x + place / 9 - centre_[g].x);
-        const auto y = static_cast<float>(3 * box_[g].y + place / 3 % 3 - centre_[g].y);
-        const auto z = static_cast<float>(3 * box_[g].z + place % 3 - centre_[g].z);
+        const auto [x, y, z] = from_centre(i, g);
         m[0] += v[0];
         m[1] += v[1];
         m[2] += v[2];
@@ -212,10 +207,7 @@ struct VoxelAggregates::Worker {
   /// The three rows of T at a node.
   void rigid(std::uint32_t node, Row* out) const {
     const std::uint32_t g = all.of_node_[node];
-    const int place = all.place_[node];
-    const auto x = static_cast<float>(3 * all.box_[g].x + place / 9 - all.centre_[g].x);
-    const auto y = static_cast<float>(3 * all.box_[g].y + place / 3 % 3 - all.centre_[g].y);
-    const auto z = static_cast<float>(3 * all.box_[g].z + place % 3 - all.centre_[g].z);
+    const auto [x, y, z] = all.from_centre(node, g);
     out[0] = {1, 0, 0, 0, z, -y, 0, 0};
     out[1] = {0, 1, 0, -z, 0, x, 0, 0};
     out[2] = {0, 0, 1, y, -x, 0, 0, 0};

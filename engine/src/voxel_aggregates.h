@@ -33,6 +33,12 @@ class VoxelAggregates {
 
  private:
   struct Worker;
+  /// Of node i of aggregate g, cells.
+  [[nodiscard]] Vec3f from_centre(std::size_t i, std::size_t g) const {
+    const int x = 3 * box_[g].x + place_[i] / 9, y = 3 * box_[g].y + place_[i] / 3 % 3,
+              z = 3 * box_[g].z + place_[i] % 3;
+    return to_float(Vec3d{x - centre_[g].x, y - centre_[g].y, z - centre_[g].z});
+  }
   const VoxelOperator& fine_;
   std::vector<std::uint32_t> of_node_;  // none: wholly fixed
   std::vector<std::uint8_t> place_;     // 9 x + 3 y + z in the box

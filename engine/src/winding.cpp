@@ -28,8 +28,8 @@ constexpr std::uint32_t lanes = 4;
 constexpr float far_radii = 2.0F;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-typedef float Lanes __attribute__((vector_size(16)));
-typedef std::int32_t Mask __attribute__((vector_size(16)));  // a lane is all ones or zero
+using Lanes [[gnu::vector_size(16)]] = float;
+using Mask [[gnu::vector_size(16)]] = std::int32_t;  // a lane is all ones or zero
 
 Lanes load(const float* p) {
   Lanes v;
@@ -54,6 +54,7 @@ struct Pack {
 
 /// The far field of a cluster up to second order about its centre: the area vector, the quadratic form
 /// of the first moments, and what the second moments come to after contraction.
+// NOLINTBEGIN(readability-identifier-naming): the names of the literature
 enum Moment {
   cx,
   cy,
@@ -83,6 +84,7 @@ enum Moment {
   xyz,
   moment_count
 };
+// NOLINTEND(readability-identifier-naming)
 using Moments = std::array<float, moment_count>;
 
 /// Four children: boxes, far fields, and where they are: an inner node, or ~pack, or nothing.

@@ -64,7 +64,7 @@ DeflatedPiece deflate_piece(std::string_view text) {
   return piece;
 }
 
-void ZipWriter::add(const std::string& name, std::vector<DeflatedPiece> pieces) {
+void ZipWriter::add(const std::string& name, const std::vector<DeflatedPiece>& pieces) {
   std::uint64_t size = end_of_stream.size(), raw_size = 0;
   uLong crc = 0;
   for (const DeflatedPiece& piece : pieces) {

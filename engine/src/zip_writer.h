@@ -26,7 +26,7 @@ class ZipWriter {
  public:
   explicit ZipWriter(OutputFile& file) : file_(&file) {}
   /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB or more.
-  void add(const std::string& name, std::vector<DeflatedPiece> pieces);
+  void add(const std::string& name, const std::vector<DeflatedPiece>& pieces);
   void add(const std::string& name, std::string_view text) { add(name, {deflate_piece(text)}); }
   /// The directory. Last.
   void finish();

@@ -73,7 +73,7 @@ Axis::Axis(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 Axis Axis::straight(Vec3d from, Vec3d to) { return along({from, to}); }
 
-Axis Axis::along(std::vector<Vec3d> points) {
+Axis Axis::along(const std::vector<Vec3d>& points) {
   const std::vector<Vec3d> line = without_repeats(points);
   double given = 0;
   for (std::size_t i = 0; i + 1 < line.size(); ++i) given += norm(line[i + 1] - line[i]);

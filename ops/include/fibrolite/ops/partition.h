@@ -29,7 +29,7 @@ class Axis {
   /// A straight axis.
   static Axis straight(Vec3d from, Vec3d to);
   /// A centre line through `points` (at least two); the field is its tangent at the nearest point.
-  static Axis along(std::vector<Vec3d> points);
+  static Axis along(const std::vector<Vec3d>& points);
   /// Unit tangent t(x). Cost: O(points of the line).
   [[nodiscard]] Vec3d tangent(Vec3d p) const;
   /// Smooth, evenly spaced, turning so gently that normal planes do not cross inside the limb.
