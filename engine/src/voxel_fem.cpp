@@ -194,7 +194,9 @@ VoxelFemResult solve(const VoxelFemProblem& problem, const Context& context) {
 
   VoxelFemResult result(impl);
   const VoxelOperator stiffness(model, impl->element, supports.fixed, context);
-  Vector f = voxel_forces(model, problem);
+  VoxelForces forces = voxel_forces(model, problem);
+  result.pressed_n = forces.pressed_n;
+  Vector f = std::move(forces.node_n);
   for (double& v : f) v /= unit;
   {
     const Context setup = context.part(0, 0.3, "multigrid");

@@ -128,8 +128,8 @@ namespace {
 
 constexpr std::array<std::size_t, 3> step{64, 8, 1};
 
-/// visit(face centre, exposed area / edge^2, its four nodes, axis and sign of its normal) for faces of the block's
-/// cells towards less material.
+/// visit(face centre, exposed area / edge^2, its four nodes, axis and sign of its normal, cell) for faces of the
+/// block's cells towards less material.
 template <class Visit>
 void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32_t* table, const Visit& visit) {
   const float* fraction = model.fraction.data() + 512 * b;
@@ -156,7 +156,7 @@ void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32
         Vec3d centre = model.centre_mm(cell);
         const double half = (high ? 0.5 : -0.5) * model.edge_mm;
         (axis == 0 ? centre.x : axis == 1 ? centre.y : centre.z) += half;
-        visit(centre, static_cast<double>(exposed), nodes, static_cast<int>(axis), high ? 1.0 : -1.0);
+        visit(centre, static_cast<double>(exposed), nodes, static_cast<int>(axis), high ? 1.0 : -1.0, c);
       };
       const float here = fraction[c];
       if (!(here > 0)) continue;
@@ -187,16 +187,17 @@ void add_surface_force(const VoxelModel& model, const VoxelForce& force, std::si
     centre.clear();
     area.clear();
     nodes.clear();
-    each_exposed_face(model, b, table.data(),
-                      [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n, int axis, double sign) {
-                        if (norm(force.facing) > 0) {
-                          exposed *= sign * force.facing[axis];
-                          if (!(exposed > 1e-9)) return;
-                        }
-                        centre.push_back(p);
-                        area.push_back(exposed);
-                        nodes.push_back(n);
-                      });
+    each_exposed_face(
+        model, b, table.data(),
+        [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n, int axis, double sign, std::size_t) {
+          if (norm(force.facing) > 0) {
+            exposed *= sign * force.facing[axis];
+            if (!(exposed > 1e-9)) return;
+          }
+          centre.push_back(p);
+          area.push_back(exposed);
+          nodes.push_back(n);
+        });
     distance.resize(centre.size());
     force.where.evaluate(centre, distance);
     for (std::size_t k = 0; k < centre.size(); ++k) {
@@ -214,6 +215,49 @@ void add_surface_force(const VoxelModel& model, const VoxelForce& force, std::si
       out[std::size_t{3} * i + static_cast<std::size_t>(axis)] += w / total * force.total_n[axis];
     }
   }
+}
+
+/// Returns the magnitude: the faces of one cell are the steps of one plane, so their forces add up as vectors.
+double add_pressure(const VoxelModel& model, const VoxelPressure& pressure, std::size_t number,
+                    std::vector<double>& out) {
+  const double force_n = 0.25 * pressure.mpa * model.edge_mm * model.edge_mm;  // on each node of a face
+  std::vector<std::uint32_t> table(729);
+  struct Face {
+    double force_n;
+    std::array<std::uint32_t, 4> nodes;
+    std::size_t axis, cell;
+  };
+  std::vector<Face> faces;
+  std::vector<Vec3d> centre;
+  std::vector<float> distance;
+  double magnitude_n = 0;
+  for (std::size_t b = 0; b < model.blocks(); ++b) {
+    if (pressure.where.bound(node_box(model, b)).lo > 0) continue;
+    model.node_table(b, table.data());
+    faces.clear();
+    centre.clear();
+    each_exposed_face(
+        model, b, table.data(),
+        [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n, int axis, double sign, std::size_t c) {
+          centre.push_back(p);
+          faces.push_back({-sign * exposed * force_n, n, static_cast<std::size_t>(axis), c});
+        });
+    std::array<Vec3d, 512> of_cell{};
+    distance.resize(centre.size());
+    pressure.where.evaluate(centre, distance);
+    for (std::size_t k = 0; k < faces.size(); ++k) {
+      if (!(distance[k] < 0)) continue;
+      Vec3d& sum = of_cell[faces[k].cell];
+      (faces[k].axis == 0 ? sum.x : faces[k].axis == 1 ? sum.y : sum.z) += 4 * faces[k].force_n;
+      for (const std::uint32_t i : faces[k].nodes) out[std::size_t{3} * i + faces[k].axis] += faces[k].force_n;
+    }
+    for (const Vec3d v : of_cell) magnitude_n += norm(v);
+  }
+  if (!(magnitude_n > 0)) {
+    throw Error(Code::BadRecipe, "pressure " + std::to_string(number + 1) + " meets no material", "pressures",
+                "let it reach over the surface");
+  }
+  return magnitude_n;
 }
 
 /// Two-point Gauss rule per axis: exact for a force that is linear in a cell.
@@ -244,14 +288,18 @@ void add_body_force(const VoxelModel& model, const std::function<Vec3d(Vec3d)>& 
 
 }  // namespace
 
-std::vector<double> voxel_forces(const VoxelModel& model, const VoxelFemProblem& problem) {
-  std::vector<double> out(3 * model.nodes(), 0.0);
+VoxelForces voxel_forces(const VoxelModel& model, const VoxelFemProblem& problem) {
+  VoxelForces forces;
+  std::vector<double>& out = forces.node_n;
+  out.assign(3 * model.nodes(), 0.0);
   for (std::size_t i = 0; i < problem.forces.size(); ++i) add_surface_force(model, problem.forces[i], i, out);
+  for (std::size_t i = 0; i < problem.pressures.size(); ++i)
+    forces.pressed_n += add_pressure(model, problem.pressures[i], i, out);
   if (problem.body_force_n_mm3) add_body_force(model, problem.body_force_n_mm3, out);
   for (const double v : out) {
     if (!std::isfinite(v)) throw Error(Code::BadRecipe, "a load is not a number", "forces");
   }
-  return out;
+  return forces;
 }
 
 }  // namespace fibrolite

@@ -20,7 +20,11 @@ struct VoxelSupports {
 /// @throws Error SolverFailed: a piece that the supports let move, with a point of it.
 void check_held(const VoxelModel& model, const VoxelPieces& pieces, const std::vector<std::uint32_t>& fixed);
 
-/// Forces on the nodes, N: three per node. @throws Error BadRecipe: no surface under a load.
-[[nodiscard]] std::vector<double> voxel_forces(const VoxelModel& model, const VoxelFemProblem& problem);
+struct VoxelForces {
+  std::vector<double> node_n;  ///< Three per node.
+  double pressed_n = 0;        ///< Sum of the magnitudes of what pressures press with.
+};
+/// @throws Error BadRecipe: no surface under a load.
+[[nodiscard]] VoxelForces voxel_forces(const VoxelModel& model, const VoxelFemProblem& problem);
 
 }  // namespace fibrolite

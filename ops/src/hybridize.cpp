@@ -38,6 +38,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
         run("verify", 0.35, [&](const Context& c) { return verify(proxy, cut, load, recipe.material, c); });
     report_decisions(cut, verified, report);
     out.parts = placed(verified.parts, stand);
+    out.candidates = cut.labels.placed(stand);
     out.field = verified.field;
     traction_mpa = [stand, standing = verified.traction_mpa](Vec3d p, Vec3d n) {
       return standing(stand.to_local(p), stand.to_local(n));

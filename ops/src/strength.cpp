@@ -89,8 +89,16 @@ class Seen final : public Shape::Function {
 /// Turns load cases into supports and forces on cells.
 class OnVoxels {
  public:
-  OnVoxels(const Solid& solid, const VerifyParams& verify, const Material& material, double cell_mm)
-      : solid_(solid), up_(normalized(verify.up)), verify_(verify), material_(material), cell_mm_(cell_mm) {}
+  OnVoxels(const Hybrid& hybrid, const Recipe& recipe, double cell_mm)
+      : solid_(hybrid.solid),
+        hybrid_(hybrid),
+        up_(normalized(recipe.verify.up)),
+        verify_(recipe.verify),
+        material_(recipe.material),
+        cell_mm_(cell_mm) {
+    // Where the outside presses: the steps of the skin, but not the far side of the shell.
+    skin_ = complement(offset(hybrid.body, -std::min(1.5 * cell_mm, 0.5 * recipe.shell.thickness_mm)));
+  }
 
   VoxelFemProblem problem(const LoadCase& load) {
     VoxelFemProblem problem;
@@ -117,9 +125,8 @@ class OnVoxels {
         const Vec3d weight = weight_n_per_mm3(material_) * unit(gravity->direction);
         problem.body_force_n_mm3 = [weight](Vec3d) { return weight; };
         load_n_ += norm(weight) * solid_.volume_mm3();
-      } else {
-        throw Error(Code::Unsupported, "a pressure acts on bodies, not yet on finished solids", load.name,
-                    "state it as a force");
+      } else if (const auto* pressure = std::get_if<Pressure>(&force)) {
+        problem.pressures.push_back({intersect({shape(pressure->where, load.name), skin_}), pressure->mpa});
       }
     }
     problem.unmeasured = unite(clamped);
@@ -160,9 +167,13 @@ class OnVoxels {
       all.push_back(half_space(half.point_mm + 0.5 * cell_mm_ * normalized(half.normal), half.normal));
     if (where.lowest) all.push_back(end(*where.lowest, unit(where.lowest->along)));
     if (where.highest) all.push_back(end(*where.highest, -unit(where.highest->along)));
-    if (where.label)
-      throw Error(Code::Unsupported, "a selection by label is for bodies, not for finished solids", name,
-                  "select by a box or half-spaces");
+    if (where.label) {
+      const int count = hybrid_.candidates.count();
+      if (*where.label >= count)
+        throw Error(Code::BadRecipe, "wants label " + std::to_string(*where.label), name,
+                    "the partition of this run has " + std::to_string(count) + ", counted from 0");
+      all.push_back(offset(hybrid_.candidates.region(*where.label), 0.5 * cell_mm_));
+    }
     if (where.seen_from)
       all.push_back(
           Shape(std::make_shared<Seen>(solid_, unit(*where.seen_from), solid_.grid().voxel_mm, 0.75 * cell_mm_)));
@@ -180,10 +191,12 @@ class OnVoxels {
   }
 
   const Solid& solid_;
+  const Hybrid& hybrid_;
   const Vec3d up_;
   const VerifyParams& verify_;
   const Material& material_;
   const double cell_mm_;
+  Shape skin_;
   double load_n_ = 0;
 };
 
@@ -266,7 +279,7 @@ std::vector<StrengthReport> strength(const Hybrid& hybrid, const Recipe& recipe,
   std::vector<StrengthReport> result;
   for (std::size_t c = 0; c < cases.size(); ++c) {
     const auto share = [&](std::size_t i) { return static_cast<double>(i) / static_cast<double>(cases.size()); };
-    OnVoxels voxels(hybrid.solid, verify, recipe.material, cell_mm);
+    OnVoxels voxels(hybrid, recipe, cell_mm);
     VoxelFemProblem problem = voxels.problem(cases[c]);
     problem.coarsen = coarsen;
     problem.residual = params.residual;
@@ -274,7 +287,7 @@ std::vector<StrengthReport> strength(const Hybrid& hybrid, const Recipe& recipe,
     const VoxelFemResult solved = solve(problem, context.part(share(c), share(c + 1), cases[c].name));
     StrengthReport& answer = result.emplace_back();
     answer.load_case = cases[c].name;
-    answer.load_n = voxels.load_n();
+    answer.load_n = voxels.load_n() + solved.pressed_n;
     answer.compliance_n_mm = solved.compliance_n_mm;
     answer.max_displacement_mm = solved.max_displacement_mm;
     answer.max_von_mises_mpa = solved.max_von_mises_mpa;

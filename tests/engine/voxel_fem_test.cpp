@@ -94,6 +94,25 @@ TEST(VoxelFem, a_bar_in_tension_carries_force_by_area_everywhere) {
   EXPECT_NEAR(yield / result.max_von_mises_mpa * 100 / (yield * area), 1, 0.01);  // failing load / (yield * area)
 }
 
+TEST(VoxelFem, a_pressure_acts_against_the_normal_of_any_surface) {
+  // A ball under pressure from all sides: p everywhere, no von Mises stress, no net force.
+  const double voxel = 0.5, radius = 6;
+  VoxelFemProblem problem;
+  problem.solid = realize(sphere({}, radius), {{-7, -7, -7}, {7, 7, 7}}, {.voxel_mm = voxel});
+  problem.poisson = 0.3;
+  problem.supports = {{sphere({}, 0.6), {true, true, true}, {}}};
+  problem.pressures = {{everything(), 2.0}};
+  const auto result = solve(problem);
+  const double area = 4 * std::numbers::pi * radius * radius;
+  EXPECT_NEAR(result.pressed_n, 2 * area, 0.03 * 2 * area);
+  EXPECT_LT(norm(result.load_n), 1e-6 * result.pressed_n);
+  // It shrinks by p (1 - 2 nu) / E.
+  const double shrinks = 2.0 * (1 - 2 * 0.3) / problem.young_mpa * 4;
+  const auto at = result.displacement_mm({4, 0, 0});
+  ASSERT_TRUE(at.has_value());
+  EXPECT_NEAR(at->x, -shrinks, 0.03 * shrinks);
+}
+
 /// The sides lie between samples: partly filled cells carry their share, and no more.
 TEST(VoxelFem, partly_filled_cells_carry_their_share) {
   const double voxel = 0.5;

@@ -96,6 +96,20 @@ TEST(Strength, its_own_weight_stands_on_its_foot) {
   EXPECT_NEAR(s.max_displacement_mm, sinks, 0.05 * sinks);
 }
 
+TEST(Strength, a_pressure_on_its_end_is_a_force_over_its_area) {
+  Recipe recipe = pulled(500);
+  Pressure pressure{.mpa = -5, .where = {}};
+  pressure.where.box_mm = Box3d{{-6, -6, 39}, {6, 6, 41}};
+  pressure.where.half_spaces = {{{0, 0, 39.9}, {0, 0, -1}}};
+  pressure.where.label = 0;
+  recipe.verify.loads[0].forces = {pressure};
+  const auto s = strength(bar(), recipe).front();
+  // The planes reach half a cell farther, so a brim of the sides is sucked too: 4 x 10 x 0.5 mm2 of cells half full.
+  EXPECT_NEAR(s.load_n, 500, 0.06 * 500);
+  EXPECT_GT(s.load_n, 500);
+  EXPECT_NEAR(s.failure_load_n, 4000, 0.06 * 4000);
+}
+
 TEST(Strength, what_it_cannot_do_it_says) {
   const auto message = [](const Recipe& recipe, const StrengthParams& params = {}) -> std::string {
     try {
@@ -105,11 +119,9 @@ TEST(Strength, what_it_cannot_do_it_says) {
     }
     return "nothing";
   };
-  Recipe pressed = pulled(500);
-  Pressure pressure{.mpa = 1, .where = {}};
-  pressure.where.box_mm = Box3d{{-6, -6, 39}, {6, 6, 41}};
-  pressed.verify.loads[0].forces = {pressure};
-  EXPECT_THAT(message(pressed), HasSubstr("pressure"));
+  Recipe unknown = pulled(500);
+  std::get<TotalForce>(unknown.verify.loads[0].forces[0]).where.label = 3;
+  EXPECT_THAT(message(unknown), HasSubstr("label 3"));
   Recipe nowhere = pulled(500);
   std::get<TotalForce>(nowhere.verify.loads[0].forces[0]).where.box_mm = Box3d{{50, 50, 50}, {60, 60, 60}};
   EXPECT_NE(message(nowhere), "nothing");

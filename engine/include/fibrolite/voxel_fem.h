@@ -33,6 +33,13 @@ struct VoxelForce {
   Vec3d facing{};
 };
 
+/// A pressure on the surface of the cells, against its normal: on exposed cell faces whose centre is where `where` is
+/// negative. The steps of a slanted surface add up to its own projections.
+struct VoxelPressure {
+  Shape where;
+  double mpa = 0;  ///< Negative: suction.
+};
+
 struct VoxelFemProblem {
   Solid solid;
   double young_mpa = 2000;  ///< > 0.
@@ -40,6 +47,7 @@ struct VoxelFemProblem {
   int coarsen = 1;          ///< Samples along the edge of a cell: 1, 2 or 4.
   std::vector<VoxelSupport> supports;
   std::vector<VoxelForce> forces;
+  std::vector<VoxelPressure> pressures;
   std::function<Vec3d(Vec3d)> body_force_n_mm3;  ///< Per mm3 of material at a point, e.g. its weight; empty: 0. Pure.
   double residual = 1e-6;                        ///< Asked for; in [1e-12, 0.1].
   int max_iterations = 500;                      ///< > 0.
@@ -72,6 +80,7 @@ class VoxelFemResult {
   double compliance_n_mm = 0;  ///< Load times displacement: twice the work the loads do.
   double max_displacement_mm = 0;
   Vec3d load_n{}, reaction_n{};     ///< Sums; in equilibrium they cancel.
+  double pressed_n = 0;             ///< Sum of the magnitudes of what the pressures press with.
   double max_von_mises_mpa = 0;     ///< Of any measured cell. Grows without limit at re-entrant edges as voxels shrink.
   double p99_von_mises_mpa = 0;     ///< 99 % of the measured material is at or below this.
   double peak_von_mises_mpa = 0;    ///< Largest after averaging stress over the cells around each node, then each cell.

@@ -28,6 +28,7 @@ struct HybridizeParams {
 struct Hybrid {
   Solid solid;  ///< The printed solid.
   Parts parts;
+  Labels candidates;  ///< Of the partition, before touching bulk became one part; of other infills: one.
   std::vector<Interface> interfaces;
   std::vector<Joint> joints;
   /// If asked for: body, shell, fill_<part>, joint_<n>, ties, specks (removed), pores (filled), solid. The union of

@@ -22,8 +22,8 @@ struct StrengthParams {
 /// of a support or of a loaded face is not counted: that is the clamp's. A force on what is seen from somewhere acts on
 /// the cell faces that look there. @throws Error BadRecipe: an empty selection, named by case and key; Unsupported;
 /// SolverFailed; Cancelled. Cost: see benchmarks/README.md.
-/// The load cases are those of the verification, load_cases(recipe.verify); a pressure and a selection by label
-/// are not for solids yet.
+/// The load cases are those of the verification, load_cases(recipe.verify). A pressure acts on the skin, not on the
+/// walls of the interior.
 [[nodiscard]] std::vector<StrengthReport> strength(const Hybrid& hybrid, const Recipe& recipe,
                                                    const StrengthParams& params = {}, const Context& context = {});
 
