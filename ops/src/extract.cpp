@@ -120,7 +120,7 @@ class BoundedPlacement {
   BoundedPlacement(const Solid& solid, double bound_mm) : solid_(&solid), bound_mm_(bound_mm) {}
   template <class Profile>
   auto operator()(const Profile& profile) const -> boost::optional<typename Profile::Point> {
-    const auto place = free_(profile);
+    auto place = free_(profile);
     if (!place) return place;
     const float off = solid_->distance({place->x(), place->y(), place->z()});
     return std::abs(static_cast<double>(off)) <= bound_mm_ ? place : boost::none;

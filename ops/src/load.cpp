@@ -48,7 +48,8 @@ void rasterize(const TetMesh& mesh, const std::vector<TetFace>& faces, const Foo
 }  // namespace
 
 Vec3d Footprint::at(const Point& point) const {
-  return frame.to_world({(point.pixel % width + 0.5) * pixel_mm, (point.pixel / width + 0.5) * pixel_mm, point.height});
+  const int x = point.pixel % width, y = point.pixel / width;
+  return frame.to_world({(x + 0.5) * pixel_mm, (y + 0.5) * pixel_mm, point.height});
 }
 
 Footprint seen_from_above(const TetMesh& body, Vec3d up, const std::function<bool(Vec3d)>& wanted) {

@@ -255,6 +255,8 @@ std::vector<PlaceReport> places_of(const VoxelFemResult& solved, const Places& p
   return list;
 }
 
+std::string quoted_case(const std::string& name) { return std::string("load case '").append(name).append("'"); }
+
 /// Cells with material at most: what the finest grid has, less by the cube of the coarsening.
 int choose_coarsening(const Solid& solid, std::int64_t most_cells) {
   const double voxel = solid.grid().voxel_mm, cells = solid.volume_mm3() / (voxel * voxel * voxel);
@@ -284,7 +286,14 @@ std::vector<StrengthReport> strength(const Hybrid& hybrid, const Recipe& recipe,
     problem.coarsen = coarsen;
     problem.residual = params.residual;
     problem.place_of = places;
-    const VoxelFemResult solved = solve(problem, context.part(share(c), share(c + 1), cases[c].name));
+    const VoxelFemResult solved = [&] {
+      try {
+        return solve(problem, context.part(share(c), share(c + 1), cases[c].name));
+      } catch (const Error& error) {
+        if (error.code() != Code::BadRecipe && error.code() != Code::SolverFailed) throw;
+        throw Error(error.code(), quoted_case(cases[c].name).append(": ").append(error.what()));
+      }
+    }();
     StrengthReport& answer = result.emplace_back();
     answer.load_case = cases[c].name;
     answer.load_n = voxels.load_n() + solved.pressed_n;

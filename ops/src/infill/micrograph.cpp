@@ -213,7 +213,7 @@ void write_gray(const std::filesystem::path& path, const GrayImage& image) {
 
 std::filesystem::path bundled_micrograph() {
   for (const char* assets : {FIBROLITE_INSTALL_ASSETS, FIBROLITE_SOURCE_ASSETS}) {
-    const std::filesystem::path path = std::filesystem::path(assets) / "textures" / "muscle.png";
+    std::filesystem::path path = std::filesystem::path(assets) / "textures" / "muscle.png";
     if (std::filesystem::exists(path)) return path;
   }
   throw Error(Code::Internal, "the bundled micrograph is missing", FIBROLITE_INSTALL_ASSETS "/textures/muscle.png",
