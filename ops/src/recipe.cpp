@@ -78,10 +78,11 @@ void check_tcs(const TcsParams& tcs) {
 }
 
 void check_mfs(const MfsParams& mfs) {
-  if (mfs.fibre_mm <= 2 * mfs.wall_mm)
+  const double least = least_fibre_mm(mfs.wall_mm, mfs.walls);
+  if (mfs.fibre_mm <= least)
     unfit("mfs.fibre_mm is " + number_text(mfs.fibre_mm) + ", no room for a void between walls of " +
               number_text(mfs.wall_mm) + " mm",
-          "recipe", "use more than " + number_text(2 * mfs.wall_mm) + " (2 * mfs.wall_mm), or thinner walls");
+          "recipe", "use more than " + number_text(least) + ", or thinner walls");
 }
 
 void check_joint(const JointParams& joint) {

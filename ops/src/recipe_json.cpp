@@ -87,6 +87,13 @@ void read(const Json& json, std::optional<std::filesystem::path>& value, Range, 
   }
 }
 
+std::string accepts(const Walls&, Range) { return "\"image\" or \"delaunay\""; }
+Json write(Walls value) { return value == Walls::Image ? "image" : "delaunay"; }
+void read(const Json& json, Walls& value, Range, const Place& place) {
+  if (json != "image" && json != "delaunay") place.refuse(json);
+  value = json == "image" ? Walls::Image : Walls::Delaunay;
+}
+
 std::string accepts(const Bridge&, Range) { return "\"mst\" or \"bbox\""; }
 Json write(Bridge value) { return value == Bridge::Mst ? "mst" : "bbox"; }
 void read(const Json& json, Bridge& value, Range, const Place& place) {
@@ -167,6 +174,8 @@ const std::vector<Field>& table() {
       field("mfs.fibre_mm", &R::mfs, &MfsParams::fibre_mm, {0.02, 1000},
             "mean distance between fibre centres; more than 2 * mfs.wall_mm"),
       field("mfs.wall_mm", &R::mfs, &MfsParams::wall_mm, {0.01, 1000}, "least membrane thickness; 2 voxels or more"),
+      field("mfs.walls", &R::mfs, &MfsParams::walls,
+            "image: membranes as synthesised; delaunay: triangles between the same fibres, stiff across"),
       field("mfs.template", &R::mfs, &MfsParams::micrograph, "micrograph that the fibres are taken from"),
 
       field("tcs.cell_mm", &R::tcs, &TcsParams::cell_mm, {0.04, 1000},

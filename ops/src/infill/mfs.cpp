@@ -184,7 +184,7 @@ SectionCount count_fibres(const LumenSection& section, const Shape& membranes, d
 void check(const MfsParams& p) {
   if (!(p.wall_mm > 0) || !std::isfinite(p.wall_mm))
     throw Error(Code::BadRecipe, "the membrane must have a thickness above zero", "mfs.wall_mm", "try 0.8");
-  if (!(p.fibre_mm > 2 * p.wall_mm) || !std::isfinite(p.fibre_mm))
+  if (!(p.fibre_mm > least_fibre_mm(p.wall_mm, p.walls)) || !std::isfinite(p.fibre_mm))
     throw Error(Code::BadRecipe, "a fibre must be wider than two membranes", "mfs.fibre_mm",
                 "raise fibre_mm or lower wall_mm");
 }
@@ -225,6 +225,7 @@ Fill generate(const Part& part, const MfsParams& params, const Shape& body, doub
   MembraneParams wanted;
   wanted.fibre_mm = params.fibre_mm;
   wanted.wall_mm = params.wall_mm;
+  wanted.walls = params.walls;
   // What reaches into the neighbour or out to the surface must still find membranes, not the clamped rim of the image.
   wanted.width_mm = extent.max.x - extent.min.x + 2 * params.fibre_mm;
   wanted.height_mm = extent.max.y - extent.min.y + 2 * params.fibre_mm;

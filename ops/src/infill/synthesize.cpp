@@ -29,8 +29,10 @@ void check(const FibreMap& map, const MembraneParams& p) {
     throw Error(Code::BadRecipe, what, where, hint);
   };
   if (!(p.wall_mm > 0)) refuse("the membrane must have a thickness above zero", "mfs.wall_mm", "try 0.8");
-  if (!(p.fibre_mm > 2 * p.wall_mm) || !std::isfinite(p.fibre_mm))
-    refuse("a fibre must be wider than two membranes", "mfs.fibre_mm", "raise fibre_mm or lower wall_mm");
+  if (!(p.fibre_mm > least_fibre_mm(p.wall_mm, p.walls)) || !std::isfinite(p.fibre_mm))
+    refuse(p.walls == Walls::Image ? "a fibre must be wider than two membranes"
+                                   : "fibres with triangles between them must lie more than four walls apart",
+           "mfs.fibre_mm", "raise fibre_mm or lower wall_mm");
   if (!(p.pixel_mm > 0) || p.pixel_mm > p.wall_mm / 4 * 1.001)
     refuse("the pixel must be at most a quarter of the membrane", "pixel_mm", "use wall_mm / 4");
   if (!(p.width_mm > 0) || !(p.height_mm > 0)) refuse("the section has no size", "width_mm, height_mm", "");
@@ -85,6 +87,22 @@ LabelImage find_cells(const GrayImage& quilted, double least_inscribed_px, int& 
   return std::move(found.label);
 }
 
+/// Sides of the Delaunay triangles between the cells' centres, px.
+std::vector<Segment2d> triangle_sides(const LabelImage& cells, int count) {
+  cv::Subdiv2D triangles({0, 0, cells.width, cells.height});
+  for (const Cell& cell : measure_cells(cells, count))
+    triangles.insert({static_cast<float>(cell.center.x), static_cast<float>(cell.center.y)});
+  std::vector<cv::Vec4f> edges;
+  triangles.getEdgeList(edges);
+  std::vector<Segment2d> sides;
+  const auto inside = [&](float x, float y) {  // the triangle around all of them has corners outside
+    return x >= 0 && y >= 0 && x < static_cast<float>(cells.width) && y < static_cast<float>(cells.height);
+  };
+  for (const cv::Vec4f& e : edges)
+    if (inside(e[0], e[1]) && inside(e[2], e[3])) sides.push_back({{e[0], e[1]}, {e[2], e[3]}});
+  return sides;
+}
+
 /// A neck in a cell parts a pocket from its void. Pockets too small to keep become membrane: their distance is mirrored
 /// at zero, which keeps it 1-Lipschitz and its magnitude at most the distance.
 void fill_pockets(FloatImage& distance, double least_depth_mm) {
@@ -122,7 +140,8 @@ MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) try 
   // Lines can be scaled freely: the pitch comes out exactly as wanted.
   const double found_pitch_px = mean_pitch(cells, measure_cells(cells, count));
   const double scale = params.fibre_mm / (found_pitch_px > 0 ? found_pitch_px : pitch_px);
-  std::vector<Segment2d> borders = smooth_borders(cells, smoothing_rounds);
+  std::vector<Segment2d> borders =
+      params.walls == Walls::Image ? smooth_borders(cells, smoothing_rounds) : triangle_sides(cells, count);
   const Vec2d middle{0.5 * (cells.width - 1), 0.5 * (cells.height - 1)};
   for (Segment2d& s : borders) s = {scale * (s.a - middle), scale * (s.b - middle)};
 

@@ -189,6 +189,33 @@ TEST(Synthesize, AsManyFibresAsThePitchSays) {
   EXPECT_NEAR(whole + cut / 2, expected, 0.15 * expected);
 }
 
+/// By Euler's formula a triangulation has twice as many triangles as corners, and three times as many sides.
+TEST(Synthesize, TrianglesBetweenTheSameFibres) {
+  MembraneParams params;
+  params.fibre_mm = 5;
+  params.wall_mm = 0.5;
+  params.width_mm = params.height_mm = 60;
+  params.pixel_mm = 0.1;
+  const MembraneImage cells = synthesize(muscle_map(), params);
+  params.walls = Walls::Delaunay;
+  const MembraneImage triangles = synthesize(muscle_map(), params);
+  const auto count = [](const MembraneImage& image) {
+    double whole = 0, cut = 0;
+    for (const Void& v : voids(image.distance_mm)) (v.at_frame ? cut : whole) += 1;
+    return whole + cut / 2;
+  };
+  EXPECT_NEAR(count(triangles) / count(cells), 2, 0.2);
+  // Walls of the hexagons about a grid of pitch p are sqrt(3) p long for each fibre, the sides of its triangles 3 p.
+  const auto material = [](const MembraneImage& image) {
+    const auto& pixels = image.distance_mm.pixels;
+    const auto solid = std::count_if(pixels.begin(), pixels.end(), [](float d) { return d < 0; });
+    return static_cast<double>(solid) / static_cast<double>(pixels.size());
+  };
+  EXPECT_NEAR(material(triangles) / material(cells), std::sqrt(3.0), 0.2);
+  params.fibre_mm = 1.9;
+  EXPECT_THROW((void)synthesize(muscle_map(), params), Error);
+}
+
 TEST(Synthesize, CellsAreClosedAndNoneIsTinyOrHuge) {
   const double mean_cell_mm2 = 2.4 * 2.4 * std::sqrt(3.0) / 2;
   for (const std::uint64_t seed : {1, 2, 3}) {

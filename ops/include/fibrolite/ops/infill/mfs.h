@@ -14,8 +14,11 @@ namespace fibrolite {
 
 /// Muscle fibres: voids packed side by side, separated by membranes that run along the column.
 struct MfsParams {
-  double fibre_mm = 2.4;  ///< Mean distance between fibre centres (void + wall); more than 2 * wall_mm.
-  double wall_mm = 0.8;   ///< Least membrane thickness; 2 voxels or more.
+  double fibre_mm =
+      2.4;  ///< Mean distance between fibre centres (void + wall); more than 2 * wall_mm (Walls::Delaunay: 4).
+  double wall_mm = 0.8;  ///< Least membrane thickness; 2 voxels or more.
+  /// Delaunay walls are 1.7 times as long as the membranes of the same fibres: for the same mass, 1.7 times fibre_mm.
+  Walls walls = Walls::Image;
   std::optional<std::filesystem::path> micrograph;  ///< Template image; default: the bundled one.
   std::uint64_t seed = 1;
 };

@@ -27,12 +27,21 @@ struct MembraneImage {
   [[nodiscard]] double width_mm() const { return distance_mm.width * pixel_mm; }
   [[nodiscard]] double height_mm() const { return distance_mm.height * pixel_mm; }
 };
+enum class Walls {
+  Image,     ///< The paper's: the membranes between the fibres.
+  Delaunay,  ///< The same fibres as corners of triangles, walls along their sides: stiff across, too.
+};
 struct MembraneParams {
   double fibre_mm = 2.4, wall_mm = 0.8;
+  Walls walls = Walls::Image;
   double width_mm = 10, height_mm = 10;  ///< Of the wanted section.
   double pixel_mm = 0.1;                 ///< min(wall / 4, 0.1 mm) or finer.
   std::uint64_t seed = 1;
 };
+/// Fibres must lie farther apart than this to leave a void: 2 walls, 4 between triangles.
+[[nodiscard]] constexpr double least_fibre_mm(double wall_mm, Walls walls) {
+  return (walls == Walls::Image ? 2 : 4) * wall_mm;
+}
 [[nodiscard]] MembraneImage synthesize(const FibreMap& map, const MembraneParams& params);
 
 /// 8-bit gray image from a .png, .jpg, .tif, .bmp file. @throws Error BadInput.
