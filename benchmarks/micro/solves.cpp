@@ -105,8 +105,19 @@ void voxels(benchmark::State& state) {
   state.counters["peak_mb"] = peak_mb();
 }
 
-BENCHMARK(tetrahedra)->Arg(100)->Arg(400)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
-BENCHMARK(tetrahedra_cholesky)->Arg(100)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
-BENCHMARK(voxels)->Arg(4)->Arg(9)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
+BENCHMARK(tetrahedra)
+    ->Arg(100)
+    ->Arg(400)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Iterations(1);
+BENCHMARK(tetrahedra_cholesky)
+    ->Arg(100)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime()
+    ->MeasureProcessCPUTime()
+    ->Iterations(1);
+BENCHMARK(voxels)->Arg(4)->Arg(9)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime()->Iterations(1);
 
 }  // namespace
