@@ -13,7 +13,7 @@
 
 #include "fibrolite/disjoint_sets.h"
 
-#include "chebyshev.h"
+#include "fibrolite/chebyshev.h"
 #include "voxel_operator.h"
 
 namespace fibrolite {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "chebyshev.h"
+#include "fibrolite/chebyshev.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "block_multigrid.h"
-#include "chebyshev.h"
+#include "fibrolite/chebyshev.h"
 #include "voxel_aggregates.h"
 #include "voxel_operator.h"
 

@@ -33,15 +33,21 @@ struct Solution {
   std::vector<Stress> centroid_stress;  ///< One per tetrahedron: the mean over its volume.
   double residual = 0;                  ///< |K u - f| over the free components / (|f| + |reactions|).
   Vec3d imbalance_n{};                  ///< Sum of reactions + sum of loads.
+  int iterations = 0;                   ///< Of conjugate gradients; 0: solved by Cholesky.
 };
-/// All load cases with one factorisation (supernodal Cholesky). Nodes without a tetrahedron stay at zero.
-/// Pins OpenBLAS to one thread for the whole process: its threads would change the bits.
-/// @throws Error SolverFailed: a piece of the mesh can move freely, the matrix is singular, the residual is above 1e-6;
-/// BadRecipe: a material constant out of range; Cancelled. Cost: 100 k unknowns in about a second, 300 k is the
-/// sensible limit.
+struct SolveParams {
+  /// Most unknowns for supernodal Cholesky; above, conjugate gradients (docs/decisions/0010).
+  std::int64_t direct_limit = 50'000;
+};
+/// All load cases with one factorisation or one preconditioner. Nodes without a tetrahedron stay at zero. The same bits
+/// on any number of threads; for that it pins OpenBLAS to one thread for the whole process.
+/// @throws Error SolverFailed: a piece of the mesh can move freely, the matrix is singular, the residual is above
+/// 1e-6, or loads and reactions differ by more than 1e-6 of their sizes;
+/// BadRecipe: a material constant out of range; TooLarge; Cancelled. Cost: up to the limit 2 s at most; above, on two
+/// cores, 115 k unknowns 2 s and 0.2 GB, 523 k 13 s and 0.7 GB, of which each further load case takes about half again.
 [[nodiscard]] std::vector<Solution> solve(const TetMesh& mesh, const Material& material,
                                           const std::vector<Fixed>& fixed, const std::vector<LoadCase>& cases,
-                                          const Context& context = {});
+                                          const SolveParams& params = {}, const Context& context = {});
 
 /// Stress at the nodes, MPa: that of the tetrahedra around each, weighted by volume.
 [[nodiscard]] std::vector<Stress> nodal_stress(const TetMesh& mesh, const Material& material,

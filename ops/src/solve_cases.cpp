@@ -31,7 +31,7 @@ std::vector<fem::Solution> solve_in(const Frame& frame, TetMesh mesh, const Mate
   for (Vec3d& p : mesh.nodes) p = into(frame, p);
   for (fem::LoadCase& load : cases)
     for (Vec3d& f : load.force_n) f = into(frame, f);
-  auto solutions = fem::solve(mesh, material, fixed, cases, context);
+  auto solutions = fem::solve(mesh, material, fixed, cases, {}, context);
   for (fem::Solution& s : solutions) {
     for (Vec3d& u : s.displacement_mm) u = out_of(frame, u);
     for (Vec3d& r : s.reaction_n) r = out_of(frame, r);
@@ -65,7 +65,7 @@ std::vector<fem::Solution> solve_cases(const TetMesh& mesh, const Material& mate
     const Context part = context.part(share(done), share(done + group.size()), "verify");
     done += group.size();
     auto some = same_axes(held.frame, Frame{})
-                    ? fem::solve(mesh, material, held.fixed, loads, part)
+                    ? fem::solve(mesh, material, held.fixed, loads, {}, part)
                     : solve_in(held.frame, mesh, material, held.fixed, std::move(loads), part);
     for (std::size_t i = 0; i < group.size(); ++i) solutions[group[i]] = std::move(some[i]);
   }

@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <string_view>
 
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
@@ -283,6 +285,207 @@ TEST(Elasticity, SameBitsOnOneAndTwoThreads) {
   EXPECT_EQ(one.reaction_n, two.reaction_n);
 }
 
+/// The same answers from the solver for large bodies, however small the body.
+constexpr SolveParams iterative{.direct_limit = 0};
+
+void expect_same(const Solution& a, const Solution& b, double relative) {
+  double largest = 0;
+  for (const Vec3d u : a.displacement_mm) largest = std::max(largest, norm(u));
+  ASSERT_GT(largest, 0);
+  for (std::size_t node = 0; node < a.displacement_mm.size(); ++node) {
+    ASSERT_LT(norm(a.displacement_mm[node] - b.displacement_mm[node]), relative * largest) << node;
+  }
+}
+
+TEST(IterativeElasticity, CantileverBendsAsTimoshenkoSays) {
+  const double length = 100, width = 8, height = 10, force = 500;
+  const TetMesh mesh = block(24, 4, 4, {length, width, height});
+  std::vector<Fixed> fixed;
+  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.x == 0; });
+  LoadCase load;
+  const auto tip = [&](Vec3d p) { return p.x == length; };
+  load.force_n = load_faces(mesh, tip, [&](Vec3d, Vec3d) { return Vec3d{0, 0, -force / (width * height)}; });
+  const Solution s = solve(mesh, steel_like, fixed, {load}, iterative).front();
+  const double inertia = width * height * height * height / 12, shear_modulus = 200000 / 2.6;
+  const double deflection = force * length * length * length / (3 * 200000 * inertia) +
+                            force * length / (5.0 / 6 * width * height * shear_modulus);
+  EXPECT_NEAR(-mean_displacement(mesh, s, tip).z, deflection, 0.01 * deflection);
+  EXPECT_LT(norm(s.imbalance_n), 1e-6 * force);
+  EXPECT_LT(s.residual, 1e-9);
+  EXPECT_LT(s.iterations, 40);
+  const Solution direct = solve(mesh, steel_like, fixed, {load}).front();
+  EXPECT_EQ(direct.iterations, 0);
+  expect_same(direct, s, 1e-6);
+}
+
+TEST(IterativeElasticity, TakesOverAboveTheLimit) {
+  const TetMesh mesh = block(16, 11, 11, {20, 14, 14});  // 33 * 23 * 23 nodes
+  ASSERT_GT(3 * static_cast<std::int64_t>(mesh.nodes.size()), SolveParams{}.direct_limit);
+  std::vector<Fixed> fixed;  // a bar in tension, free to grow thin: its answer is exact
+  fix(fixed, mesh, {0}, [](Vec3d p) { return p.x == 0; });
+  fix(fixed, mesh, {1}, [](Vec3d p) { return p.y == 0; });
+  fix(fixed, mesh, {2}, [](Vec3d p) { return p.z == 0; });
+  LoadCase load;
+  load.force_n = load_faces(
+      mesh, [](Vec3d p) { return p.x == 20; }, [](Vec3d, Vec3d n) { return 100 * n; });
+  const Solution s = solve(mesh, steel_like, fixed, {load}).front();
+  EXPECT_GT(s.iterations, 0);
+  for (std::size_t node = 0; node < mesh.nodes.size(); ++node) {
+    const Vec3d p = mesh.nodes[node];
+    ASSERT_LT(norm(s.displacement_mm[node] - 100.0 / 200000 * Vec3d{p.x, -0.3 * p.y, -0.3 * p.z}), 1e-9);
+  }
+  EXPECT_LT(norm(s.imbalance_n), 1e-6 * 100 * 14 * 14);
+}
+
+TEST(IterativeElasticity, ManyLoadsAndSettlementsEqualCholesky) {
+  Random random(2, "iterative");
+  const TetMesh mesh = bricks(5, 4, 6, [&](Vec3d p) {
+    const auto shake = [&](double v) { return v > 0.01 && v < 0.99 ? 0.5 * (random.uniform() - 0.5) : 0.0; };
+    return Vec3d{10 * p.x + shake(p.x), 8 * p.y + shake(p.y), 12 * p.z + shake(p.z)};
+  });
+  std::vector<Fixed> fixed;
+  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
+  fix(fixed, mesh, {1}, [](Vec3d p) { return p.x == 10; });
+  const auto top = [](Vec3d p) { return p.z == 12; };
+  LoadCase push, twist, settle, tilt;
+  push.force_n = load_faces(mesh, top, [](Vec3d, Vec3d) { return Vec3d{3, 1, -2}; });
+  twist.force_n = load_faces(mesh, top, [](Vec3d at, Vec3d) { return Vec3d{4 - at.y, at.x - 5, 0}; });
+  settle.fixed_mm.assign(fixed.size(), 0.25);
+  for (const Fixed& f : fixed) tilt.fixed_mm.push_back(f.axis == 1 ? 0.01 * mesh.nodes[f.node].x : 0);
+  const std::vector<LoadCase> cases{push, twist, settle, tilt};
+  const auto direct = solve(mesh, steel_like, fixed, cases), other = solve(mesh, steel_like, fixed, cases, iterative);
+  ASSERT_EQ(other.size(), 4U);
+  for (std::size_t c = 0; c < 4; ++c) {
+    expect_same(direct[c], other[c], 1e-6);
+    EXPECT_LT(other[c].residual, 1e-6);
+  }
+  for (const Vec3d u : other[2].displacement_mm) EXPECT_LT(norm(u - Vec3d{0.25, 0.25, 0.25}), 1e-9);
+}
+
+/// Held at middles of edges only: the coarse level has no corner that is held and must learn it from the elements.
+TEST(IterativeElasticity, SupportsOnMiddlesOfEdgesCount) {
+  const TetMesh mesh = block(4, 4, 4, {4, 4, 4});
+  std::vector<bool> middle(mesh.nodes.size(), false);
+  for (const auto& tet : mesh.tets) {
+    for (std::size_t k = 4; k < 10; ++k) middle[tet[k]] = true;
+  }
+  std::vector<Fixed> fixed;
+  for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
+    if (!middle[node] || mesh.nodes[node].z != 0) continue;
+    for (int axis = 0; axis < 3; ++axis) fixed.push_back({node, axis});
+  }
+  LoadCase load;
+  load.force_n = load_faces(
+      mesh, [](Vec3d p) { return p.z == 4; },
+      [](Vec3d, Vec3d) {
+        return Vec3d{3, 1, -2};
+      });
+  const Solution s = solve(mesh, steel_like, fixed, {load}, iterative).front();
+  expect_same(solve(mesh, steel_like, fixed, {load}).front(), s, 1e-6);
+  EXPECT_LT(s.iterations, 60);
+}
+
+TEST(IterativeElasticity, SameBitsOnOneAndTwoThreads) {
+  const TetMesh mesh = block(9, 8, 10, {10, 11, 12});
+  std::vector<Fixed> fixed;
+  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
+  LoadCase load;
+  load.force_n = load_faces(
+      mesh, [](Vec3d p) { return p.z == 12; },
+      [](Vec3d, Vec3d) {
+        return Vec3d{3, 1, -2};
+      });
+  const auto run = [&](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return solve(mesh, steel_like, fixed, {load}, iterative).front();
+  };
+  const Solution one = run(1), two = run(2);
+  EXPECT_EQ(one.iterations, two.iterations);
+  EXPECT_EQ(one.displacement_mm, two.displacement_mm);
+  EXPECT_EQ(one.centroid_stress, two.centroid_stress);
+  EXPECT_EQ(one.reaction_n, two.reaction_n);
+}
+
+TEST(IterativeElasticity, NearlyIncompressibleIsSlowerButRight) {
+  const Material rubber{.young_mpa = 10, .poisson = 0.49};
+  const TetMesh mesh = block(12, 4, 4, {30, 8, 8});
+  std::vector<Fixed> fixed;
+  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.x == 0; });
+  LoadCase load;
+  load.force_n = load_faces(
+      mesh, [](Vec3d p) { return p.x == 30; },
+      [](Vec3d, Vec3d) {
+        return Vec3d{0, 0, -0.01};
+      });
+  const Solution s = solve(mesh, rubber, fixed, {load}, iterative).front();
+  expect_same(solve(mesh, rubber, fixed, {load}).front(), s, 1e-6);
+  EXPECT_LT(s.iterations, 200);
+}
+
+TEST(IterativeElasticity, ProgressRisesToOneAndCancelIsSeen) {
+  const TetMesh mesh = block(8, 8, 8, {10, 10, 10});
+  std::vector<Fixed> fixed;
+  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
+  LoadCase load;
+  load.force_n = load_faces(
+      mesh, [](Vec3d p) { return p.z == 10; },
+      [](Vec3d, Vec3d) {
+        return Vec3d{1, 0, 0};
+      });
+  std::vector<double> seen;
+  const Context watched([&](double f, std::string_view) { seen.push_back(f); }, {});
+  static_cast<void>(solve(mesh, steel_like, fixed, {load, load}, iterative, watched));
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
+  EXPECT_GT(seen.size(), 10U);
+  EXPECT_EQ(seen.back(), 1);
+  Context* handle = nullptr;
+  Context stopped(
+      [&](double f, std::string_view) {
+        if (f > 0.4) handle->cancel();
+      },
+      {});
+  handle = &stopped;
+  try {
+    static_cast<void>(solve(mesh, steel_like, fixed, {load}, iterative, stopped));
+    FAIL() << "a cancelled solve ended";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), Code::Cancelled);
+  }
+}
+
+/// Two blocks that share an edge and no more: the second can swing, whichever solver is asked.
+TEST(IterativeElasticity, ABodyThatHangsByAnEdgeIsRefused) {
+  TetMesh mesh = block(3, 3, 3, {3, 3, 3});
+  const TetMesh other = bricks(3, 3, 3, [](Vec3d p) { return Vec3d{3 + 3 * p.x, 3 * p.y, 3 + 3 * p.z}; });
+  std::vector<std::uint32_t> number;
+  for (const Vec3d p : other.nodes) {
+    const auto same = std::find_if(mesh.nodes.begin(), mesh.nodes.end(), [&](Vec3d q) { return norm(p - q) < 1e-9; });
+    number.push_back(static_cast<std::uint32_t>(same - mesh.nodes.begin()));
+    if (same == mesh.nodes.end()) mesh.nodes.push_back(p);
+  }
+  for (auto tet : other.tets) {
+    for (auto& node : tet) node = number[node];
+    mesh.tets.push_back(tet);
+  }
+  std::vector<Fixed> fixed;
+  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
+  LoadCase load;
+  load.force_n = load_faces(
+      mesh, [](Vec3d p) { return p.z == 6; },
+      [](Vec3d, Vec3d) {
+        return Vec3d{0, 0, -1};
+      });
+  for (const SolveParams& params : {SolveParams{}, iterative}) {
+    try {
+      static_cast<void>(solve(mesh, steel_like, fixed, {load}, params));
+      FAIL() << "a swing was solved, limit " << params.direct_limit;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), Code::SolverFailed);
+      EXPECT_THAT(error.what(), HasSubstr("hang by a point or an edge"));
+    }
+  }
+}
+
 TEST(Elasticity, WhatFloatsIsNamed) {
   TetMesh mesh = block(1, 1, 1, {2, 2, 2});
   const TetMesh other = bricks(1, 1, 1, [](Vec3d p) { return p + Vec3d{7, 8, 9}; });
@@ -294,13 +497,15 @@ TEST(Elasticity, WhatFloatsIsNamed) {
   }
   std::vector<Fixed> fixed;
   fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
-  try {
-    static_cast<void>(solve(mesh, steel_like, fixed, {LoadCase{}}));
-    FAIL() << "a floating piece was solved";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), Code::SolverFailed);
-    EXPECT_THAT(error.what(), HasSubstr("not held"));
-    EXPECT_THAT(error.what(), HasSubstr("(8, 9, 10)"));
+  for (const SolveParams& params : {SolveParams{}, iterative}) {
+    try {
+      static_cast<void>(solve(mesh, steel_like, fixed, {LoadCase{}}, params));
+      FAIL() << "a floating piece was solved";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), Code::SolverFailed);
+      EXPECT_THAT(error.what(), HasSubstr("not held"));
+      EXPECT_THAT(error.what(), HasSubstr("(8, 9, 10)"));
+    }
   }
 }
 
