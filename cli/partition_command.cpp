@@ -96,6 +96,7 @@ void run_partition(const PartitionOptions& options) {
   Stopwatch stage(report.stages);
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
+  recipe.verify.loads = with_paint(std::move(recipe.verify.loads), model.painted);
   if (options.voxel_mm) check_memory(model.mesh, *options.voxel_mm, recipe, InfillKind::Solid, options.run);
   const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.8, ""));
   const Partition parts = placed(found.partition, found.proxy.frame);

@@ -53,7 +53,8 @@ StressField judge_body(const Model& model, const Recipe& recipe, Report& report,
     return verify(found.proxy, found.partition, in_stance(recipe.verify), recipe.material,
                   context.part(0.5, 1, "verify"));
   });
-  report.verification = {verified.tets, verified.dof, verified.residual, verified.equilibrium, verified.selected};
+  report.verification = {verified.tets,     verified.dof,         verified.iterations,
+                         verified.residual, verified.equilibrium, verified.selected};
   report.warnings.insert(report.warnings.end(), verified.notes.begin(), verified.notes.end());
   for (const Part& part : placed(verified.parts, found.proxy.frame).parts) report.parts.push_back(part_report(part));
   return std::move(verified.field);
@@ -94,6 +95,7 @@ void run_verify(const VerifyOptions& options) {
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
   report.model.volume_mm3 = signed_volume(model.mesh);
+  recipe.verify.loads = with_paint(std::move(recipe.verify.loads), model.painted);
   StressField field;
   if (options.solid) field = judge_solid(options, model, recipe, report, context.part(0.1, 0.9, ""));
   if (field.cases.empty()) {

@@ -49,6 +49,10 @@ Vec3d resolved(const Direction& d, const LoadSetting& setting) {
 Region resolved(const Selection& where, const TetMesh& body, const LoadSetting& setting) {
   Region region;
   region.label = where.label;
+  if (where.painted) {
+    region.paint = where.painted->distance;
+    region.paint_mm = std::max(setting.tolerance_mm, 1e-3);
+  }
   const auto half = [&](Vec3d point, Vec3d normal) {
     const Vec3d n = normalized(normal);
     region.planes.push_back({n, dot(point, n), setting.tolerance_mm});
@@ -283,6 +287,7 @@ struct Finder {
         if (h.region.contains(p, out.setting.labels)) return false;
       for (const Plane& plane : where.planes)
         if (dot(p, plane.normal) > plane.offset + plane.tolerance * std::abs(dot(to_eye, plane.normal))) return false;
+      if (where.paint && static_cast<double>((*where.paint)(p)) > where.paint_mm) return false;
       return !where.label || out.setting.labels.label(p - out.setting.tolerance_mm * to_eye) == *where.label;
     });
     const double pixel_mm2 = footprint.pixel_mm * footprint.pixel_mm;

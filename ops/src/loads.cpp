@@ -2,10 +2,14 @@
 #include "fibrolite/ops/loads.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <set>
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/text.h"
+#include "fibrolite/winding.h"
 
 namespace fibrolite {
 namespace {
@@ -55,8 +59,8 @@ struct Check {
   }
   void selection(const Selection& where, const std::string& at) const {
     if (!where.box_mm && where.half_spaces.empty() && !where.lowest && !where.highest && !where.label &&
-        !where.seen_from)
-      refuse("selects by nothing", at, "give box_mm, half_space, lowest, highest, label or seen_from");
+        !where.painted && !where.seen_from)
+      refuse("selects by nothing", at, "give box_mm, half_space, lowest, highest, label, painted or seen_from");
     if (where.box_mm && (!is_finite(where.box_mm->min) || !is_finite(where.box_mm->max) || where.box_mm->empty()))
       refuse("has a box that holds nothing", at + ".box_mm", "give the least corner first: [[x, y, z], [x, y, z]]");
     for (const HalfSpace& half : where.half_spaces)
@@ -110,6 +114,7 @@ void turn(const Frame& frame, Selection& where) {
   for (HalfSpace& half : where.half_spaces) half = {frame.to_local(half.point_mm), turned(frame, half.normal)};
   if (where.lowest) turn(frame, where.lowest->along);
   if (where.highest) turn(frame, where.highest->along);
+  if (where.painted) where.painted->distance = placed(where.painted->distance, inverse(frame));
   if (where.seen_from) turn(frame, *where.seen_from);
 }
 
@@ -148,6 +153,45 @@ void check_loads(const std::vector<LoadCase>& cases) {
     for (std::size_t k = 0; k < load.forces.size(); ++k)
       std::visit([&](const auto& force) { check.force(force, indexed("forces", k)); }, load.forces[k]);
   }
+}
+
+std::string color_text(Rgb color) {
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "#%02x%02x%02x", unsigned{color.r}, unsigned{color.g}, unsigned{color.b});
+  return text.data();
+}
+
+std::vector<LoadCase> with_paint(std::vector<LoadCase> cases, const Mesh& colored) {
+  const auto find = [&](Selection& where, const std::string& name) {
+    if (!where.painted) return;
+    Mesh chosen{colored.vertices, {}, {}};
+    std::set<std::string> others;
+    for (std::size_t t = 0; t < colored.triangle_colors.size(); ++t) {
+      if (colored.triangle_colors[t] == where.painted->color) {
+        chosen.triangles.push_back(colored.triangles[t]);
+      } else if (others.size() < 8) {
+        others.insert(color_text(colored.triangle_colors[t]));
+      }
+    }
+    if (chosen.triangles.empty()) {
+      std::string hint = "the model has no colours: give a .ply whose faces have red, green and blue";
+      if (!others.empty()) hint = "its triangles are";
+      for (const std::string& other : others) hint.append(" ").append(other);
+      throw Error(Code::BadRecipe,
+                  std::string("no triangle of the model is painted ").append(color_text(where.painted->color)),
+                  std::string("load case '").append(name).append("'"), hint);
+    }
+    const Shape distance = distance_to(WindingTree(chosen));
+    where.painted->distance = complement(unite({distance, complement(distance)}));  // of an open piece: no sides
+  };
+  for (LoadCase& load : cases) {
+    for (Support& support : load.supports) find(support.where, load.name);
+    for (Force& force : load.forces) {
+      if (auto* total = std::get_if<TotalForce>(&force)) find(total->where, load.name);
+      if (auto* pressure = std::get_if<Pressure>(&force)) find(pressure->where, load.name);
+    }
+  }
+  return cases;
 }
 
 std::vector<LoadCase> in_frame(const Frame& frame, std::vector<LoadCase> cases) {

@@ -40,6 +40,14 @@ class Reader {
     if (!json_.is_string()) refuse("a name in quotes");
     return json_.get<std::string>();
   }
+  [[nodiscard]] Rgb color() const {
+    const std::string given = json_.is_string() ? json_.get<std::string>() : std::string();
+    if (given.size() != 7 || given[0] != '#' || given.find_first_not_of("0123456789abcdefABCDEF", 1) != given.npos)
+      refuse("a colour, \"#rrggbb\"");
+    const unsigned long value = std::stoul(given.substr(1), nullptr, 16);
+    return {static_cast<std::uint8_t>(value >> 16), static_cast<std::uint8_t>((value >> 8) & 255U),
+            static_cast<std::uint8_t>(value & 255U)};
+  }
   [[nodiscard]] Vec3d vector(const std::string& accepts = "[x, y, z]") const {
     if (!json_.is_array() || json_.size() != 3) refuse(accepts);
     for (const Json& entry : json_)
@@ -114,6 +122,10 @@ Selection selection(const Reader& reader) {
                  {"lowest", [&](const Reader& r) { where.lowest = end_share(r); }},
                  {"highest", [&](const Reader& r) { where.highest = end_share(r); }},
                  {"label", [&](const Reader& r) { where.label = r.count(); }},
+                 {"painted",
+                  [&](const Reader& r) {
+                    where.painted = Paint{r.color(), {}};
+                  }},
                  {"seen_from", [&](const Reader& r) { where.seen_from = r.direction(); }}});
   return where;
 }
@@ -174,6 +186,7 @@ Json written(const Selection& where) {
   if (where.lowest) json["lowest"] = written(*where.lowest);
   if (where.highest) json["highest"] = written(*where.highest);
   if (where.label) json["label"] = *where.label;
+  if (where.painted) json["painted"] = color_text(where.painted->color);
   if (where.seen_from) json["seen_from"] = written(*where.seen_from);
   return json;
 }

@@ -199,6 +199,10 @@ Model prepare(const MeshFile& file, const PrepareParams& params, const Context& 
   scale(mesh, factor);
   if (const double side = used_box(mesh).longest_side(); !std::isfinite(side))
     throw Error(Code::BadInput, "the model is too large to be held in mm", number_text(longest * factor, 4) + " mm");
+  if (!file.mesh.triangle_colors.empty()) {
+    model.painted = mesh;
+    model.painted.triangle_colors = file.mesh.triangle_colors;
+  }
   context.check();
   context.progress(0.2);
 

@@ -26,7 +26,7 @@ std::vector<Corner> clipped(const std::vector<Corner>& polygon, const Corner& va
 bool Region::contains(Vec3d p, const Labels& labels) const {
   return std::all_of(planes.begin(), planes.end(),
                      [&](const Plane& plane) { return dot(p, plane.normal) <= plane.offset + plane.tolerance; }) &&
-         (!label || labels.label(p) == *label);
+         (!label || labels.label(p) == *label) && (!paint || static_cast<double>((*paint)(p)) <= paint_mm);
 }
 
 Corner between(const Corner& a, const Corner& b, double t) {
@@ -59,7 +59,15 @@ void cover(const TetMesh& mesh, const std::vector<TetFace>& faces, const Region&
     };
     for (std::size_t i = 2; i < polygon.size(); ++i) {
       const CornerTriangle whole{polygon[0], polygon[i - 1], polygon[i]};
-      if (!region.label) {
+      bool whole_is_painted = true;
+      if (region.paint) {
+        const Vec3d a = place(whole[0]), b = place(whole[1]), c = place(whole[2]), m = (a + b + c) / 3;
+        const double reach = std::max({norm(a - m), norm(b - m), norm(c - m)});
+        const auto off = static_cast<double>((*region.paint)(m));
+        if (off > region.paint_mm + reach) continue;
+        whole_is_painted = off + reach <= region.paint_mm;
+      }
+      if (!region.label && whole_is_painted) {
         give(whole);
         continue;
       }
@@ -74,7 +82,8 @@ void cover(const TetMesh& mesh, const std::vector<TetFace>& faces, const Region&
         Corner middle{};
         for (std::size_t k = 0; k < 3; ++k) middle[k] = (piece[0][k] + piece[1][k] + piece[2][k]) / 3;
         // Asked below the surface: a cut that runs in the surface itself would answer at random.
-        if (labels.label(place(middle) - below_mm * normal) == *region.label) give(piece);
+        if (region.label && labels.label(place(middle) - below_mm * normal) != *region.label) return;
+        if (whole_is_painted || static_cast<double>((*region.paint)(place(middle))) <= region.paint_mm) give(piece);
       };
       for (std::size_t u = 0; u < pieces_along; ++u) {
         for (std::size_t v = 0; u + v < pieces_along; ++v) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A piece of a finite element mesh's surface, cut out by planes and a label.
+// A piece of a finite element mesh's surface, cut out by planes, a label and paint.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fibrolite/ops/partition.h"
+#include "fibrolite/shape.h"
 #include "fibrolite/tet_mesh.h"
 
 namespace fibrolite {
@@ -19,10 +20,12 @@ struct Plane {
   double tolerance;  ///< How far a surface may lie off, along its own normal, mm.
 };
 
-/// What all planes and the label agree on.
+/// What all planes, the label and the paint agree on.
 struct Region {
   std::vector<Plane> planes;
   std::optional<int> label;
+  std::optional<Shape> paint;  ///< Distance to the painted surface; what lies within paint_mm of it.
+  double paint_mm = 0;
   /// With the whole tolerance, for a point that has no normal. Cost: O(planes).
   [[nodiscard]] bool contains(Vec3d p, const Labels& labels) const;
 };
@@ -33,8 +36,8 @@ using CornerTriangle = std::array<Corner, 3>;
 [[nodiscard]] Corner between(const Corner& a, const Corner& b, double t);
 
 /// Calls visit(face, outward normal, triangle, area_mm2) for triangles that cover the part of each face that lies in
-/// the region, in the order of the faces: exactly between planes (Sutherland and Hodgman 1974); a label is asked for
-/// sixteen pieces of each, `below_mm` under the surface. Cost: O(faces * planes).
+/// the region, in the order of the faces: exactly between planes (Sutherland and Hodgman 1974); label and paint are
+/// asked for sixteen pieces of each, `below_mm` under the surface. Cost: O(faces * planes).
 void cover(const TetMesh& mesh, const std::vector<TetFace>& faces, const Region& region, const Labels& labels,
            double below_mm, const std::function<void(const TetFace&, Vec3d, const CornerTriangle&, double)>& visit);
 

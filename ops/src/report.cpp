@@ -190,6 +190,7 @@ std::string to_json(const Report& report) {
       {"verification",
        {{"tets", report.verification.tets},
         {"dof", report.verification.dof},
+        {"iterations", report.verification.iterations},
         {"residual", report.verification.residual},
         {"equilibrium", report.verification.equilibrium},
         {"selected", array(report.verification.selected)}}},

@@ -21,8 +21,8 @@ void report_decisions(const Partition& partition, const Verification& verificati
   report.threshold = partition.threshold;
   report.stable_from = partition.stable_from;
   report.stable_to = partition.stable_to;
-  report.verification = {verification.tets, verification.dof, verification.residual, verification.equilibrium,
-                         verification.selected};
+  report.verification = {verification.tets,     verification.dof,         verification.iterations,
+                         verification.residual, verification.equilibrium, verification.selected};
   append(report.warnings, partition.notes);
   append(report.warnings, verification.notes);
 }

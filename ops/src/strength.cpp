@@ -174,6 +174,7 @@ class OnVoxels {
                     "the partition of this run has " + std::to_string(count) + ", counted from 0");
       all.push_back(offset(hybrid_.candidates.region(*where.label), 0.5 * cell_mm_));
     }
+    if (where.painted) all.push_back(offset(where.painted->distance, cell_mm_));
     if (where.seen_from)
       all.push_back(
           Shape(std::make_shared<Seen>(solid_, unit(*where.seen_from), solid_.grid().voxel_mm, 0.75 * cell_mm_)));

@@ -313,6 +313,7 @@ void account(Verification& result, const Model& model, const Setting& setting) {
   result.dof += 3 * static_cast<std::int64_t>(model.mesh.nodes.size());
   for (std::size_t c = 0; c < model.solutions.size(); ++c) {
     const fem::Solution& s = model.solutions[c];
+    result.iterations = std::max(result.iterations, s.iterations);
     result.residual = std::max(result.residual, s.residual);
     result.equilibrium = std::max(result.equilibrium, norm(s.imbalance_n) / setting.loads[c].magnitude_n());
   }

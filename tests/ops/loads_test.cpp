@@ -240,6 +240,41 @@ TEST(Loads, ASupportSmallerThanATriangleHoldsTheTrianglesItTouches) {
   EXPECT_LE(held_nodes(held), 9U);
 }
 
+/// The top of the box, the half with x below 10 in red; its sides are left out.
+Mesh painted_top() {
+  Mesh mesh;
+  mesh.vertices = {{0, 0, 40}, {10, 0, 40}, {20, 0, 40}, {0, 30, 40}, {10, 30, 40}, {20, 30, 40}};
+  mesh.triangles = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}};
+  const Rgb red{255, 0, 0}, gray{128, 128, 128};
+  mesh.triangle_colors = {red, red, gray, gray};
+  return mesh;
+}
+
+TEST(Loads, PaintSelectsTheTrianglesOfItsColour) {
+  Selection red;
+  red.painted = Paint{{255, 0, 0}, {}};
+  const std::vector<LoadCase> asked{standing(Pressure{2, red})};
+  const std::vector<LoadCase> found = with_paint(asked, painted_top());
+  EXPECT_NEAR(norm(sum(forces(found[0])) - Vec3d{0, 0, -2 * 10 * 30.0}), 0, 1e-6);
+  // Seen from another frame it is the same surface.
+  const Frame frame{{3, 4, 5}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
+  const Shape& world = std::get<Pressure>(found[0].forces[0]).where.painted->distance;
+  const Shape local = std::get<Pressure>(in_frame(frame, found)[0].forces[0]).where.painted->distance;
+  for (const Vec3d p : {Vec3d{5, 5, 40}, Vec3d{15, 7, 38}, Vec3d{-4, 2, 60}})
+    EXPECT_NEAR(world(p), local(frame.to_local(p)), 1e-4);
+  // Without the model there is nothing, and a colour that is not there is named with those that are.
+  EXPECT_THAT(refusal([&] { static_cast<void>(forces(asked[0])); }), HasSubstr("selects nothing"));
+  red.painted->color = {0, 0, 255};
+  EXPECT_THAT(refusal([&] {
+                static_cast<void>(with_paint({standing(Pressure{2, red})}, painted_top()));
+              }),
+              AllOf(HasSubstr("#0000ff"), HasSubstr("'test'"), HasSubstr("#808080 #ff0000")));
+  EXPECT_THAT(refusal([&] {
+                static_cast<void>(with_paint({standing(Pressure{2, red})}, Mesh{}));
+              }),
+              HasSubstr("no colours"));
+}
+
 TEST(Loads, WhatSelectsNothingSaysHowLittle) {
   const Selection nowhere = in_box({100, 100, 100}, {110, 110, 110});
   const auto message = [&](const LoadCase& load) { return refusal([&] { static_cast<void>(applied(load)); }); };

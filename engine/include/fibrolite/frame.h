@@ -17,6 +17,14 @@ struct Frame {
   [[nodiscard]] constexpr Vec3d to_world(Vec3d p) const { return origin + p.x * x + p.y * y + p.z * z; }
 };
 
+/// The world as this frame sees it: its to_local() is the other's to_world().
+[[nodiscard]] constexpr Frame inverse(const Frame& frame) {
+  return {frame.to_local({}),
+          {frame.x.x, frame.y.x, frame.z.x},
+          {frame.x.y, frame.y.y, frame.z.y},
+          {frame.x.z, frame.y.z, frame.z.z}};
+}
+
 /// A frame whose z axis is `z` (any length but zero). The choice of x is deterministic: it is built from the
 /// world axis least aligned with z.
 [[nodiscard]] inline Frame frame_along(Vec3d origin, Vec3d z) {

@@ -12,6 +12,8 @@
 
 #include "fibrolite/box.h"
 #include "fibrolite/frame.h"
+#include "fibrolite/mesh.h"
+#include "fibrolite/shape.h"
 #include "fibrolite/vec.h"
 
 namespace fibrolite {
@@ -34,6 +36,11 @@ struct EndShare {
   double share = 0.05;  ///< Above 0, up to 1.
   Direction along{Direction::Of::Up, {}};
 };
+/// Triangles of one colour in the file of the model.
+struct Paint {
+  Rgb color;
+  Shape distance{};  ///< To them, mm, never negative. Far away until with_paint() has found them.
+};
 /// A piece of the body's surface: what all of the selectors given agree on; at least one.
 struct Selection {
   std::optional<Box3d> box_mm{};
@@ -42,6 +49,7 @@ struct Selection {
   /// A candidate of the partition, numbered from 0 as partition() does: before touching bulk candidates become one
   /// part.
   std::optional<int> label{};
+  std::optional<Paint> painted{};
   /// Only what is seen first by an eye that looks from there (the direction points from the body to the eye), and lies
   /// in no support of the case. A force on it is spread by projected area. Not for supports.
   std::optional<Direction> seen_from{};
@@ -96,6 +104,13 @@ struct Selected {
 /// What can be wrong with load cases before there is a body: no support, no force, no selector, a number out of range,
 /// a name given twice. @throws Error BadRecipe, naming the case and the key.
 void check_loads(const std::vector<LoadCase>& cases);
+
+/// The same cases with each colour found in `colored`, the model as it was read (Model::painted).
+/// @throws Error BadRecipe: a colour that no triangle has, with those there are. Cost: O(n log n) per colour.
+[[nodiscard]] std::vector<LoadCase> with_paint(std::vector<LoadCase> cases, const Mesh& colored);
+
+/// "#ff8000"
+[[nodiscard]] std::string color_text(Rgb color);
 
 /// The same cases in a frame's coordinates. A box becomes six half-spaces, so it stays what it is however the frame
 /// lies; words for directions stay words. Cost: O(selectors).

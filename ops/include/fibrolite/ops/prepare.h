@@ -22,6 +22,7 @@ struct PrepareParams {
 };
 struct Model {
   Mesh mesh;                          ///< Welded, outward by signed volume, mm.
+  Mesh painted;                       ///< As read and scaled, with its colours; empty if it has none.
   std::vector<std::string> repairs;   ///< E.g. "turned inside out", "12 duplicate triangles dropped".
   std::vector<std::string> warnings;  ///< E.g. the units warning (longest side under 5 mm or over 2 m).
 };

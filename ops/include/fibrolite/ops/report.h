@@ -60,10 +60,10 @@ struct ModelReport {
 /// Sizes and checks of the finite element solves; zero where there was none.
 struct VerificationReport {
   std::int64_t tets = 0, dof = 0;        ///< Of all solves together.
+  int iterations = 0;                    ///< Of the solve that took most; 0: all were direct.
   double residual = 0, equilibrium = 0;  ///< Relative, of the worst solve.
   std::vector<Selected> selected;        ///< What supports and forces got hold of.
 };
-/// What the finished solid carries under one load case (strength.h).
 /// Stress in one place of the printed solid: a joint, or the shell or the infill of a part.
 struct PlaceReport {
   std::string name;
@@ -72,6 +72,7 @@ struct PlaceReport {
   double failure_load_n = 0;  ///< load * yield / p99 of this place.
   Vec3d weakest_mm{};
 };
+/// What the finished solid carries under one load case (strength.h).
 struct StrengthReport {
   std::string load_case;
   double load_n = 0, compliance_n_mm = 0, max_displacement_mm = 0;

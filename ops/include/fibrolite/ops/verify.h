@@ -43,6 +43,7 @@ struct Verification {
   Parts parts;
   std::vector<int> part_of_candidate;
   std::int64_t tets = 0, dof = 0;  ///< Of all solves together.
+  int iterations = 0;              ///< Of the solve that took most; 0: all were direct.
   double residual = 0;             ///< Relative, worst solve.
   double equilibrium = 0;          ///< |sum of reactions + sum of loads| / load, worst solve.
   std::vector<Selected> selected;  ///< What each support and force of each load case got hold of.
