@@ -231,7 +231,8 @@ bool is_group(std::string_view key) {
 [[noreturn]] void refuse_unknown(const std::string& key, const std::string& source) {
   std::vector<std::string> names;
   for (const Field& row : table()) names.push_back(row.about.key);
-  throw Error(Code::BadRecipe, "unknown key " + key, source, "did you mean " + nearest_name(key, names) + "?");
+  throw Error(Code::BadRecipe, "unknown key " + key, source,
+              std::string("did you mean ").append(nearest_name(key, names)).append("?"));
 }
 
 /// What depends on more than one key.

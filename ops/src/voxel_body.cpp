@@ -85,7 +85,7 @@ void lay_out(VoxelBody& body, const Solid& solid) {
                           static_cast<double>(low(box.min.z))};
   body.size = {samples(box.min.x, box.max.x), samples(box.min.y, box.max.y), samples(box.min.z, box.max.z)};
   const double all = static_cast<double>(body.size.x) * body.size.y * body.size.z;
-  if (all > static_cast<double>(std::numeric_limits<std::int32_t>::max() / 2)) {
+  if (all > 0.5 * std::numeric_limits<std::int32_t>::max()) {
     throw Error(Code::TooLarge, "the proxy has too many samples", "partition", "use a coarser proxy");
   }
   std::size_t d = 0;

@@ -33,7 +33,7 @@ class BadInput : public ::testing::Test {
     return models / name;
   }
   fs::path good_model() {
-    const fs::path path = models / "cube.stl";
+    fs::path path = models / "cube.stl";
     write_mesh(path, cube(20));
     return path;
   }

@@ -19,7 +19,6 @@ namespace {
 using namespace fibrolite::testing;
 using nlohmann::json;
 using ::testing::ElementsAre;
-using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;

@@ -20,6 +20,7 @@ struct Case {
   const char* file;
   const char* infill;
 };
+// NOLINTNEXTLINE(readability-identifier-naming): the name GoogleTest looks for
 void PrintTo(const Case& c, std::ostream* out) { *out << c.file << " " << c.infill; }
 
 class RealModels : public ::testing::TestWithParam<Case> {};

@@ -147,23 +147,23 @@ TEST(OutputFile, discarding_removes_what_is_uncommitted_and_stops_its_commit) {
 class SmallDisk : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (mount("none", dir_.path().c_str(), "tmpfs", 0, "size=64k") != 0)
+    if (mount("none", dir.path().c_str(), "tmpfs", 0, "size=64k") != 0)
       GTEST_SKIP() << "a small file system cannot be mounted here";
     mounted_ = true;
   }
   void TearDown() override {
-    if (mounted_) umount(dir_.path().c_str());
+    if (mounted_) umount(dir.path().c_str());
   }
-  TempDir dir_;
+  TempDir dir;
 
  private:
   bool mounted_ = false;
 };
 
 TEST_F(SmallDisk, a_full_disk_is_an_error_and_keeps_the_old_file) {
-  std::ofstream(dir_ / "out.txt") << "old";
+  std::ofstream(dir / "out.txt") << "old";
   {
-    OutputFile file(dir_ / "out.txt");
+    OutputFile file(dir / "out.txt");
     const Error error = error_of([&] {
       file.write(std::string(100'000, 'x'));
       file.commit();
@@ -171,8 +171,8 @@ TEST_F(SmallDisk, a_full_disk_is_an_error_and_keeps_the_old_file) {
     EXPECT_EQ(error.code(), Code::Io);
     EXPECT_THAT(error.what(), HasSubstr("No space left"));
   }
-  EXPECT_EQ(content(dir_ / "out.txt"), "old");
-  EXPECT_EQ(files_in(dir_.path()), 1);
+  EXPECT_EQ(content(dir / "out.txt"), "old");
+  EXPECT_EQ(files_in(dir.path()), 1);
 }
 
 }  // namespace

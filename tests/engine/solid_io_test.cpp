@@ -20,7 +20,6 @@ namespace fibrolite {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using testing::TempDir;
 

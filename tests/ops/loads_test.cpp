@@ -14,6 +14,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "models.h"
+#include "refusal.h"
 #include "solve_cases.h"
 
 namespace fibrolite {
@@ -21,19 +22,9 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::refusal;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// The message of the BadRecipe error that `work` throws; empty if it throws none.
-std::string refusal(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), Code::BadRecipe) << error.what();
-    return error.what();
-  }
-  return {};
-}
 
 /// A block of bricks with a corner in the origin, six tetrahedra each.
 TetMesh block(int n, Vec3d size) {

@@ -12,24 +12,15 @@
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/text.h"
+#include "refusal.h"
 
 namespace fibrolite {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::refusal;
 
-/// The message of the BadRecipe error that `work` throws; empty if it throws none.
-template <class Work>
-std::string refusal(Work&& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), Code::BadRecipe) << error.what();
-    return error.what();
-  }
-  return {};
-}
 std::string refusal_of(const std::string& json) {
   return refusal([&] { static_cast<void>(parse_recipe(json, Recipe{}, "mine.json")); });
 }
