@@ -288,24 +288,24 @@ class RealModel : public ::testing::TestWithParam<const char*> {
   void SetUp() override {
     const auto path = testing::shared_model(GetParam());
     if (!path) GTEST_SKIP() << "the folder of real models is missing";
-    mesh_ = scaled_to(read_mesh(*path).mesh, 100);
-    if (signed_volume(mesh_) < 0) mesh_ = testing::flipped(mesh_);
+    model = scaled_to(read_mesh(*path).mesh, 100);
+    if (signed_volume(model) < 0) model = testing::flipped(model);
   }
-  Mesh mesh_;
+  Mesh model;
 };
 
 TEST_P(RealModel, has_the_sides_of_its_winding_number_and_does_not_leak) {
   const double voxel = 0.5;
-  const Solid solid = solid_of(mesh_, voxel, 1);
+  const Solid solid = solid_of(model, voxel, 1);
   expect_no_leak(solid);
-  const WindingTree tree(mesh_);
+  const WindingTree tree(model);
   Random random(5, GetParam());
   int wrong = 0, checked = 0, inside = 0;
   for (int i = 0; i < 20000; ++i) {
-    Vec3d p = random_point(random, bounds(mesh_).grown(2));
+    Vec3d p = random_point(random, bounds(model).grown(2));
     if (i % 2 == 0) {
-      const auto v = static_cast<std::size_t>(random.below(mesh_.vertices.size()));
-      p = to_double(mesh_.vertices[v]) + 3 * voxel * random_point(random, {{-1, -1, -1}, {1, 1, 1}});
+      const auto v = static_cast<std::size_t>(random.below(model.vertices.size()));
+      p = to_double(model.vertices[v]) + 3 * voxel * random_point(random, {{-1, -1, -1}, {1, 1, 1}});
     }
     const double w = tree.winding(p), d = tree.nearest(p).distance_mm;
     if (std::abs(w - 0.5) < 0.25 || d < 1.5 * voxel) continue;

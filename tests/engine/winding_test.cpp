@@ -122,31 +122,31 @@ class TreeOfModel : public ::testing::TestWithParam<const char*> {
   void SetUp() override {
     const std::string name = GetParam();
     if (name == "torus") {
-      mesh_ = testing::torus_mesh(20, 7, 90, 40);
+      model = testing::torus_mesh(20, 7, 90, 40);
     } else if (const auto path = testing::shared_model(name)) {
-      mesh_ = read_mesh(*path).mesh;
+      model = read_mesh(*path).mesh;
     } else {
       GTEST_SKIP() << "the folder of real models is missing";
     }
   }
-  Mesh mesh_;
+  Mesh model;
 };
 
 TEST_P(TreeOfModel, agrees_with_brute_force) {
-  const WindingTree tree(mesh_);
-  const Box3d box = bounds(mesh_);
+  const WindingTree tree(model);
+  const Box3d box = bounds(model);
   const double size = box.longest_side();
   Random random(1, GetParam());
-  const std::size_t points = mesh_.triangles.size() < 20000 ? 200 : 30;
+  const std::size_t points = model.triangles.size() < 20000 ? 200 : 30;
   for (std::size_t i = 0; i < points; ++i) {
     Vec3d p = random_point(random, box.grown(0.2 * size));
     if (i % 2 == 0) {  // half of them near the surface
-      const auto v = static_cast<std::size_t>(random.below(mesh_.vertices.size()));
-      p = to_double(mesh_.vertices[v]) + 0.01 * size * (random_point(random, {{-1, -1, -1}, {1, 1, 1}}));
+      const auto v = static_cast<std::size_t>(random.below(model.vertices.size()));
+      p = to_double(model.vertices[v]) + 0.01 * size * (random_point(random, {{-1, -1, -1}, {1, 1, 1}}));
     }
-    EXPECT_NEAR(tree.winding(p), winding_by_brute_force(mesh_, p), 0.01);
+    EXPECT_NEAR(tree.winding(p), winding_by_brute_force(model, p), 0.01);
     const auto nearest = tree.nearest(p);
-    EXPECT_NEAR(nearest.distance_mm, distance_by_brute_force(mesh_, p), 1e-9 * size);
+    EXPECT_NEAR(nearest.distance_mm, distance_by_brute_force(model, p), 1e-9 * size);
     EXPECT_NEAR(norm(nearest.point - p), nearest.distance_mm, 1e-12 * size);
   }
 }

@@ -72,7 +72,8 @@ TEST(Stance, parts_come_back_to_the_world) {
   samples.count = 2;
   samples.clamp_mm = 10;
   for (int i = 0; i < 125; ++i) {
-    const double z = -4 + 2.0 * (i / 25);
+    const int layer = i / 25;
+    const double z = -4 + 2.0 * layer;
     samples.label.push_back(z < 1 ? 0 : 1);
     samples.near.push_back({i, 0, 1, static_cast<float>(std::abs(z - 1))});
   }

@@ -68,18 +68,18 @@ struct Printed {
 Printed parse(const std::string& text, std::size_t nodes, std::size_t elements) {
   Printed printed;
   std::istringstream lines(text);
-  enum { none, displacements, stresses } table = none;
+  enum { None, Displacements, Stresses } table = None;
   for (std::string line; std::getline(lines, line);) {
     if (line.find("displacements") != std::string::npos) {
-      table = displacements;
+      table = Displacements;
       printed.displacement.emplace_back(nodes);
     } else if (line.find("stresses") != std::string::npos) {
-      table = stresses;
+      table = Stresses;
       printed.at_points.emplace_back(elements);
-    } else if (std::istringstream cells(line); table == displacements) {
+    } else if (std::istringstream cells(line); table == Displacements) {
       std::size_t node = 0;
       if (Vec3d u{}; cells >> node >> u.x >> u.y >> u.z) printed.displacement.back().at(node - 1) = u;
-    } else if (table == stresses) {
+    } else if (table == Stresses) {
       std::size_t element = 0, point = 0;
       if (StressTensor s{}; cells >> element >> point >> s[0] >> s[1] >> s[2] >> s[3] >> s[5] >> s[4])
         printed.at_points.back().at(element - 1).at(point - 1) = s;

@@ -22,12 +22,12 @@ using std::numbers::pi;
 MembraneImage disc_image(double radius_mm, double half_mm, double pixel_mm = 0.1) {
   MembraneImage image;
   image.pixel_mm = pixel_mm;
-  const int n = 2 * static_cast<int>(std::lround(half_mm / pixel_mm)) + 1;
+  const int middle = static_cast<int>(std::lround(half_mm / pixel_mm)), n = 2 * middle + 1;
   image.distance_mm = FloatImage(n, n);
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x)
       image.distance_mm(x, y) =
-          static_cast<float>(std::hypot((x - n / 2) * pixel_mm, (y - n / 2) * pixel_mm) - radius_mm);
+          static_cast<float>(std::hypot((x - middle) * pixel_mm, (y - middle) * pixel_mm) - radius_mm);
   return image;
 }
 
@@ -202,9 +202,10 @@ TEST(Sweep, ABlockGivesWhatSinglePointsGive) {
     const double a = 1.4 * random.uniform() + 0.05;
     const Vec3d low{25 * std::cos(a) - 3, 25 * std::sin(a) - 3, -3};
     for (std::size_t i = 0; i < 512; ++i) {
-      x[i] = static_cast<float>(low.x + 0.8 * static_cast<double>(i / 64));
-      y[i] = static_cast<float>(low.y + 0.8 * static_cast<double>(i / 8 % 8));
-      z[i] = static_cast<float>(low.z + 0.8 * static_cast<double>(i % 8));
+      const std::size_t a = i / 64, b = i / 8 % 8, c = i % 8;
+      x[i] = static_cast<float>(low.x + 0.8 * static_cast<double>(a));
+      y[i] = static_cast<float>(low.y + 0.8 * static_cast<double>(b));
+      z[i] = static_cast<float>(low.z + 0.8 * static_cast<double>(c));
     }
     swept.evaluate({x.data(), y.data(), z.data(), 512}, out.data());
     for (std::size_t i = 0; i < 512; i += 7) EXPECT_NEAR(out[i], swept({x[i], y[i], z[i]}), 1e-5);
