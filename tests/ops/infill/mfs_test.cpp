@@ -202,10 +202,10 @@ TEST(Sweep, ABlockGivesWhatSinglePointsGive) {
     const double a = 1.4 * random.uniform() + 0.05;
     const Vec3d low{25 * std::cos(a) - 3, 25 * std::sin(a) - 3, -3};
     for (std::size_t i = 0; i < 512; ++i) {
-      const std::size_t a = i / 64, b = i / 8 % 8, c = i % 8;
-      x[i] = static_cast<float>(low.x + 0.8 * static_cast<double>(a));
-      y[i] = static_cast<float>(low.y + 0.8 * static_cast<double>(b));
-      z[i] = static_cast<float>(low.z + 0.8 * static_cast<double>(c));
+      const std::size_t row = i / 64, column = i / 8 % 8, depth = i % 8;
+      x[i] = static_cast<float>(low.x + 0.8 * static_cast<double>(row));
+      y[i] = static_cast<float>(low.y + 0.8 * static_cast<double>(column));
+      z[i] = static_cast<float>(low.z + 0.8 * static_cast<double>(depth));
     }
     swept.evaluate({x.data(), y.data(), z.data(), 512}, out.data());
     for (std::size_t i = 0; i < 512; i += 7) EXPECT_NEAR(out[i], swept({x[i], y[i], z[i]}), 1e-5);
