@@ -68,10 +68,20 @@ Shape membranes() {
 }
 
 void tcs_block(benchmark::State& state) { per_block(state, crystal({})); }
+void tcs_stretched_block(benchmark::State& state) { per_block(state, crystal({.stretch_z = true})); }
+void tcs_any_cell_block(benchmark::State& state) { per_block(state, crystal({.cell_mm = {6, 7, 5}})); }
+void tcs_network_block(benchmark::State& state) { per_block(state, crystal({.form = TcsForm::Network})); }
+void tcs_sheet_block(benchmark::State& state) { per_block(state, crystal({.form = TcsForm::Sheet})); }
+void tcs_turned_block(benchmark::State& state) { per_block(state, crystal({.rotate_deg = {10, 20, 30}})); }
 void tcs_point(benchmark::State& state) { per_point(state, crystal({})); }
 void mfs_block(benchmark::State& state) { per_block(state, membranes()); }
 void mfs_point(benchmark::State& state) { per_point(state, membranes()); }
 BENCHMARK(tcs_block);
+BENCHMARK(tcs_stretched_block);
+BENCHMARK(tcs_any_cell_block);
+BENCHMARK(tcs_network_block);
+BENCHMARK(tcs_sheet_block);
+BENCHMARK(tcs_turned_block);
 BENCHMARK(tcs_point);
 BENCHMARK(mfs_block);
 BENCHMARK(mfs_point);

@@ -51,8 +51,9 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const bool sections = params.infill == InfillKind::Hybrid || params.infill == InfillKind::Mfs;
   const Shape model_distance = sections ? distance_to(WindingTree(model.mesh)) : Shape();
   std::vector<Fill> fills;
-  run("infill", 0.40, [&](const Context&) {
-    for (const Part& part : out.parts.parts) fills.push_back(fill(part, params.infill, recipe, model_distance));
+  run("infill", 0.40, [&](const Context& c) {
+    const auto thickness = grading(model.mesh, recipe, c);
+    for (const Part& p : out.parts.parts) fills.push_back(fill(p, params.infill, recipe, model_distance, thickness));
   });
   std::vector<double> demand_n;
   run("joints", 0.45, [&](const Context& c) {
@@ -76,7 +77,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, assembly);
   const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
-    return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm}, c);
+    return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()}, c);
   });
   out.solid = tied.solid;
 

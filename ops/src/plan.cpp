@@ -13,10 +13,12 @@ double choose_voxel(const Box3d& model, const Recipe& recipe, InfillKind infill,
 double predict_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill) {
   const double surface_mm2 = area(model), volume_mm3 = std::abs(signed_volume(model));
   const double h = voxel_mm;
-  // Surface of the structure per volume of lumen: 16 sticks and 8 balls per cell; walls with two sides per fibre.
-  const TcsParams& t = recipe.tcs;
-  const double cell3 = t.cell_mm * t.cell_mm * t.cell_mm;
-  const double tcs = 3.15 * (16 * t.stick_mm * 0.433 * t.cell_mm + 8 * t.ball_mm * t.ball_mm) / cell3;
+  // Surface of the structure per volume of lumen: 16 sticks and 8 balls per cell; both sides of the membrane, or one;
+  // walls with two sides per fibre.
+  const TcsParams t = sized(recipe.tcs);
+  const double cell = t.cell_mm.least();
+  const double sticks = 3.15 * (16 * t.stick_mm * 0.433 * cell + 8 * t.ball_mm * t.ball_mm) / (cell * cell * cell);
+  const double tcs = t.form == TcsForm::Sticks ? sticks : (t.form == TcsForm::Sheet ? 2 : 1) * 3.84 / cell;
   const double mfs = 4 / recipe.mfs.fibre_mm;
   const double per_mm3 = infill == InfillKind::Solid ? 0 : infill == InfillKind::Tcs ? tcs : std::max(tcs, mfs);
   const double faces_mm2 = surface_mm2 * (infill == InfillKind::Solid ? 1 : 2) + per_mm3 * volume_mm3;

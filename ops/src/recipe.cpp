@@ -48,12 +48,16 @@ struct Feature {
   const char* key;
   double mm;
 };
+/// What the thickness of the crystal's thinnest members follows from.
+const char* member_key(const TcsParams& tcs) {
+  return tcs.density ? "tcs.density" : tcs.form == TcsForm::Sheet ? "tcs.wall_mm" : "tcs.stick_mm";
+}
 std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   std::vector<Feature> list;
   if (infill == InfillKind::Solid) return list;
   list.push_back({"shell.thickness_mm", recipe.shell.thickness_mm});
   const bool hybrid = infill == InfillKind::Hybrid;
-  if (hybrid || infill == InfillKind::Tcs) list.push_back({"tcs.stick_mm", recipe.tcs.stick_mm});
+  if (hybrid || infill == InfillKind::Tcs) list.push_back({member_key(recipe.tcs), members(recipe.tcs).least_mm});
   if (hybrid || infill == InfillKind::Mfs) list.push_back({"mfs.wall_mm", recipe.mfs.wall_mm});
   if (hybrid && recipe.joint.enabled) {
     list.push_back({"joint.layer_mm", recipe.joint.layer_mm});
@@ -67,14 +71,40 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   throw Error(Code::BadRecipe, what, where, hint);
 }
 
-void check_tcs(const TcsParams& tcs) {
-  if (tcs.cell_mm < 4 * tcs.stick_mm)
-    unfit(
-        "tcs.cell_mm is " + number_text(tcs.cell_mm) + ", too small for sticks of " + number_text(tcs.stick_mm) + " mm",
-        "recipe", "use a cell of " + number_text(4 * tcs.stick_mm) + " or more (4 * tcs.stick_mm), or thinner sticks");
-  if (tcs.ball_mm < tcs.stick_mm)
+void check_tcs(const TcsParams& given) {
+  const TcsParams tcs = sized(given);
+  const CellEdges& cell = tcs.cell_mm;
+  if (cell.most() > 3 * cell.least())
+    unfit(std::string("tcs.cell_mm has edges of ")
+              .append(number_text(cell.least()))
+              .append(" and ")
+              .append(number_text(cell.most())),
+          "recipe", "use edges that are at most 3 times each other");
+  const bool sheet = tcs.form == TcsForm::Sheet;
+  const double member = members(tcs).most_mm, times = cell_per_member(tcs.form);
+  if (cell.least() < times * member * (1 - 1e-12))
+    unfit(std::string("tcs.cell_mm is ")
+              .append(number_text(cell.least()))
+              .append(sheet ? ", too small for walls of " : ", too small for sticks of ")
+              .append(number_text(member))
+              .append(" mm"),
+          "recipe",
+          std::string("use a cell of ")
+              .append(number_text(times * member))
+              .append(" or more (")
+              .append(number_text(times))
+              .append(" * ")
+              .append(sheet ? "tcs.wall_mm), or thinner walls" : "tcs.stick_mm), or thinner sticks"));
+  if (tcs.form == TcsForm::Sticks && tcs.ball_mm < tcs.stick_mm)
     unfit("tcs.ball_mm is " + number_text(tcs.ball_mm) + ", smaller than the sticks", "recipe",
           "use " + number_text(tcs.stick_mm) + " or more (tcs.stick_mm)");
+  if (tcs.grade == TcsGrade::None) return;
+  if (tcs.grade_most < tcs.grade_least)
+    unfit("tcs.grade_most is " + number_text(tcs.grade_most) + ", less than the least", "recipe",
+          "use " + number_text(tcs.grade_least) + " or more (tcs.grade_least)");
+  if (tcs.grade_depth_mm < cell.most())
+    unfit("tcs.grade_depth_mm is " + number_text(tcs.grade_depth_mm) + ", less than a cell", "recipe",
+          "use " + number_text(cell.most()) + " or more (tcs.cell_mm)");
 }
 
 void check_mfs(const MfsParams& mfs) {
@@ -125,7 +155,10 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   constexpr double rounding = 1 - 1e-9;  // 0.8 mm at a voxel of 0.4 mm is two voxels, whatever the last bit says
   for (const Feature& feature : features(recipe, infill))
     if (feature.mm < 2 * voxel_mm * rounding)
-      unfit(std::string(feature.key) + " is " + number_text(feature.mm) + " mm, thinner than 2 voxels",
+      unfit(std::string(feature.key)
+                .append(feature.key == std::string_view("tcs.density") ? " makes members of " : " is ")
+                .append(number_text(feature.mm))
+                .append(" mm, thinner than 2 voxels"),
             "voxel " + number_text(voxel_mm) + " mm",
             "use " + number_text(2 * voxel_mm) + " or more, or --voxel " + number_text(feature.mm / 2) + " or less");
 }

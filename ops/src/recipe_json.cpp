@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One table of keys drives reading, printing, --set, range checks and help.
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/recipe.h"
@@ -101,6 +103,42 @@ void read(const Json& json, Bridge& value, Range, const Place& place) {
   value = json == "mst" ? Bridge::Mst : Bridge::Bbox;
 }
 
+constexpr std::array<std::pair<TcsForm, const char*>, 3> forms{
+    {{TcsForm::Sticks, "sticks"}, {TcsForm::Network, "network"}, {TcsForm::Sheet, "sheet"}}};
+std::string accepts(const TcsForm&, Range) { return "\"sticks\", \"network\" or \"sheet\""; }
+Json write(TcsForm value) { return forms[static_cast<std::size_t>(value)].second; }
+void read(const Json& json, TcsForm& value, Range, const Place& place) {
+  for (const auto& [form, name] : forms)
+    if (json == name) {
+      value = form;
+      return;
+    }
+  place.refuse(json);
+}
+
+std::string accepts(const TcsGrade&, Range) { return "\"none\" or \"surface\""; }
+Json write(TcsGrade value) { return value == TcsGrade::None ? "none" : "surface"; }
+void read(const Json& json, TcsGrade& value, Range, const Place& place) {
+  if (json != "none" && json != "surface") place.refuse(json);
+  value = json == "none" ? TcsGrade::None : TcsGrade::Surface;
+}
+
+std::string accepts(const CellEdges&, Range range) { return range.words() + ", or three of them, [x, y, z]"; }
+Json write(const CellEdges& value) {
+  if (value.x == value.y && value.y == value.z) return value.x;
+  return {value.x, value.y, value.z};
+}
+void read(const Json& json, CellEdges& value, Range range, const Place& place) {
+  Vec3d edges;
+  if (json.is_array()) {
+    read(json, edges, range, place);
+  } else {
+    read(json, edges.x, range, place);
+    edges.y = edges.z = edges.x;
+  }
+  value = {edges.x, edges.y, edges.z};
+}
+
 std::string accepts(const std::vector<LoadCase>&, Range) {
   std::string names;
   for (const std::string& name : load_preset_names()) names += "\"" + name + "\", ";
@@ -178,13 +216,29 @@ const std::vector<Field>& table() {
             "image: membranes as synthesised; delaunay: triangles between the same fibres, stiff across"),
       field("mfs.template", &R::mfs, &MfsParams::micrograph, "micrograph that the fibres are taken from"),
 
+      field("tcs.form", &R::tcs, &TcsParams::form,
+            "the paper's balls and sticks; the same network without sharp joints; the membrane between two of those"),
       field("tcs.cell_mm", &R::tcs, &TcsParams::cell_mm, {0.04, 1000},
-            "edge of the cubic cell; 4 * tcs.stick_mm or more"),
-      field("tcs.stick_mm", &R::tcs, &TcsParams::stick_mm, {0.01, 250}, "stick diameter; 2 voxels or more"),
-      field("tcs.ball_mm", &R::tcs, &TcsParams::ball_mm, {0.01, 1000}, "ball diameter; tcs.stick_mm or more"),
+            "edge of the cubic cell, or its three edges; 4 * tcs.stick_mm (sheet: 4 * tcs.wall_mm; network: 3 *) or "
+            "more"),
+      field("tcs.stick_mm", &R::tcs, &TcsParams::stick_mm, {0.01, 250},
+            "diameter of sticks, of a network where it is thinnest; 2 voxels or more"),
+      field("tcs.ball_mm", &R::tcs, &TcsParams::ball_mm, {0.01, 1000}, "ball diameter of sticks; tcs.stick_mm or more"),
+      field("tcs.wall_mm", &R::tcs, &TcsParams::wall_mm, {0.01, 250}, "thickness of a sheet; 2 voxels or more"),
+      field("tcs.density", &R::tcs, &TcsParams::density, {0, 1},
+            "share of material in a cell: sticks and balls, necks or walls get as thick as that takes; auto: as given"),
       field("tcs.shift_mm", &R::tcs, &TcsParams::shift_mm, {-1e6, 1e6}, "lattice origin, world axes"),
+      field("tcs.rotate_deg", &R::tcs, &TcsParams::rotate_deg, {-360, 360},
+            "turns of the lattice about its origin: about world x, then y, then z"),
       field("tcs.stretch_z", &R::tcs, &TcsParams::stretch_z,
             "cells taller by sqrt(2): sticks at 45 degrees, printable without support"),
+      field("tcs.grade", &R::tcs, &TcsParams::grade, "where members are thicker: nowhere, or toward the surface"),
+      field("tcs.grade_least", &R::tcs, &TcsParams::grade_least, {0.01, 10},
+            "if graded, thickness of all members is multiplied by this deep inside"),
+      field("tcs.grade_most", &R::tcs, &TcsParams::grade_most, {0.01, 10},
+            "and by this under the shell; tcs.grade_least or more"),
+      field("tcs.grade_depth_mm", &R::tcs, &TcsParams::grade_depth_mm, {0.04, 1000},
+            "how deep under the shell the change ends; tcs.cell_mm or more"),
 
       field("joint.enabled", &R::joint, &JointParams::enabled, "layers and columns where parts meet"),
       field("joint.bridge", &R::joint, &JointParams::bridge,

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "fibrolite/realize.h"
+#include "fibrolite/to_solid.h"
 
 namespace fibrolite {
 
@@ -21,26 +22,36 @@ std::string infill_of(const Part& part, InfillKind run) {
   return {};
 }
 
-Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body) {
+std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const Context& context) {
+  if (recipe.tcs.grade == TcsGrade::None) return std::nullopt;
+  // Of its own, coarse voxel, so that the fine one changes nothing.
+  const double shell_mm = recipe.shell.thickness_mm, depth = recipe.tcs.grade_depth_mm;
+  const ToSolidParams coarse{.grid = {.voxel_mm = depth / 8}, .inside_band_mm = shell_mm + depth};
+  return thicker_at_surface(recipe.tcs, distance_to(to_solid(mesh, coarse, context).solid), shell_mm);
+}
+
+Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
+          const std::optional<Shape>& thickness) {
   const std::string name = infill_of(part, run);
-  if (name == "tcs") return generate(part, recipe.tcs);
+  if (name == "tcs") return thickness ? generate(part, recipe.tcs, *thickness) : generate(part, recipe.tcs);
   if (name == "mfs") return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
   return {.shape = everything()};
 }
 
 double section_pixel(const Recipe& recipe) { return std::min(0.25 * recipe.mfs.wall_mm, 0.1); }
 
-double tie_mm(const Recipe& recipe, double voxel_mm) { return std::max(recipe.tcs.stick_mm, 2 * voxel_mm); }
+double tie_mm(const Recipe& recipe, double voxel_mm) { return std::max(members(recipe.tcs).least_mm, 2 * voxel_mm); }
 
 std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                             const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
                             const Context& context) {
   std::vector<Joint> joints;
+  const double member = members(recipe.tcs).least_mm;
   for (std::size_t i = 0; i < interfaces.size(); ++i) {
     const Interface& at = interfaces[i];
     const auto a = static_cast<std::size_t>(at.a), b = static_cast<std::size_t>(at.b);
     const bool crystal_a = parts.parts[a].kind() == Kind::Bulk, crystal_b = parts.parts[b].kind() == Kind::Bulk;
-    joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal_a, crystal_b, recipe.tcs.stick_mm, body,
+    joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal_a, crystal_b, member, body,
                           recipe.shell.thickness_mm, recipe.seed, static_cast<int>(i), recipe.joint, context));
     context.progress(static_cast<double>(i + 1) / static_cast<double>(interfaces.size()));
   }

@@ -3,6 +3,7 @@
 // report.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,7 +35,10 @@ class Run {
 
 /// "mfs", "tcs" or "solid": what a part gets in a run.
 [[nodiscard]] std::string infill_of(const Part& part, InfillKind run);
-[[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body);
+/// How much thicker the crystal is where (TcsParams::grade); none if it is not graded.
+[[nodiscard]] std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const Context& context);
+[[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
+                        const std::optional<Shape>& thickness);
 
 /// Edge of a section's pixel, mm: min(wall / 4, 0.1), whatever the voxel.
 [[nodiscard]] double section_pixel(const Recipe& recipe);

@@ -44,6 +44,27 @@ std::vector<std::string> kinds(const Report& report) {
   return result;
 }
 
+TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density) {
+  const Mesh mesh = model("molar");
+  for (const TcsForm form : {TcsForm::Sticks, TcsForm::Network, TcsForm::Sheet}) {
+    HybridizeParams params;
+    params.infill = InfillKind::Tcs;
+    params.voxel_mm = 0.3;
+    params.recipe.tcs = {.form = form, .cell_mm = 12, .density = 0.2};
+    const Report even = run(mesh, params).report;
+    EXPECT_EQ(even.solid.pieces, 1);
+    const PartReport part = even.parts.at(0);
+    EXPECT_NEAR(part.infill_volume_mm3 / part.lumen_mm3, 0.2, 0.03);
+
+    params.recipe.tcs.grade = TcsGrade::Surface;
+    params.recipe.tcs.grade_most = 1.4;
+    params.recipe.tcs.grade_depth_mm = 12;
+    const Report thicker = run(mesh, params).report;
+    EXPECT_EQ(thicker.solid.pieces, 1);
+    EXPECT_GT(thicker.parts.at(0).infill_volume_mm3, 1.15 * part.infill_volume_mm3);
+  }
+}
+
 TEST(Hybridize, quadruped_has_fibres_in_its_legs_and_crystal_in_its_body_at_every_voxel) {
   const Mesh mesh = model("quadruped");
   const Outcome coarse = run(mesh, {.recipe = sturdy(), .voxel_mm = 0.5}),

@@ -108,6 +108,22 @@ TEST(Recipe, ThresholdIsAutoOrANumber) {
               HasSubstr("partition.threshold cannot be \"atuo\""));
 }
 
+TEST(Recipe, CrystalsHaveAFormACellAndADensity) {
+  const Recipe recipe = parse_recipe(
+      R"({"tcs": {"form": "sheet", "cell_mm": [5, 6, 7.5], "density": 0.25, "grade": "surface"}})", Recipe{}, "x");
+  EXPECT_EQ(recipe.tcs.form, TcsForm::Sheet);
+  EXPECT_EQ(recipe.tcs.cell_mm, CellEdges(5, 6, 7.5));
+  EXPECT_EQ(recipe.tcs.density, 0.25);
+  EXPECT_EQ(recipe.tcs.grade, TcsGrade::Surface);
+  EXPECT_EQ(to_json(parse_recipe(to_json(recipe), Recipe{}, "printed")), to_json(recipe));
+  EXPECT_EQ(set(recipe, "tcs.cell_mm=4").tcs.cell_mm, CellEdges(4));
+  EXPECT_FALSE(set(recipe, "tcs.density=auto").tcs.density.has_value());
+  EXPECT_EQ(set(recipe, "tcs.form=network").tcs.form, TcsForm::Network);
+  EXPECT_THAT(refusal_of_set("tcs.form=tube"), HasSubstr("\"sticks\", \"network\" or \"sheet\""));
+  EXPECT_THAT(refusal_of_set("tcs.cell_mm=[5,6]"), HasSubstr("or three of them"));
+  EXPECT_THAT(refusal_of_set("tcs.density=1.5"), HasSubstr("tcs.density"));
+}
+
 TEST(Recipe, OneSeedForAll) {
   EXPECT_EQ(set(Recipe{}, "seed=7").mfs.seed, 7U);
   EXPECT_EQ(parse_recipe(R"({"seed": 9})", Recipe{}, "x").mfs.seed, 9U);
@@ -298,6 +314,31 @@ TEST(CheckRecipe, TwoVoxelsIsTheLimit) {
               AllOf(HasSubstr("thinner than 2 voxels"), HasSubstr("0.82")));
   EXPECT_THAT(refusal([] { check_recipe(set(Recipe{}, "tcs.stick_mm=0.3"), 0.25); }),
               HasSubstr("tcs.stick_mm is 0.3 mm"));
+}
+
+TEST(CheckRecipe, OfASheetItIsTheWall) {
+  const Recipe sheet = set(set(Recipe{}, "tcs.form=sheet"), "tcs.wall_mm=0.3");
+  EXPECT_DOUBLE_EQ(thinnest_mm(sheet, InfillKind::Tcs), 0.3);
+  EXPECT_THAT(refusal([&] { check_recipe(sheet, 0.2); }), HasSubstr("tcs.wall_mm is 0.3 mm"));
+  EXPECT_EQ(refusal([&] { check_recipe(sheet, 0.15, InfillKind::Tcs); }), "");
+  const Recipe light = set(sheet, "tcs.density=0.1");  // 3.84 walls to a cell of 6 mm: 0.157 mm
+  EXPECT_NEAR(thinnest_mm(light, InfillKind::Tcs), 0.157, 0.002);
+  EXPECT_THAT(refusal([&] { check_recipe(light, 0.1); }), HasSubstr("tcs.density makes members of 0.15"));
+  EXPECT_THAT(refusal([&] { check_recipe(set(sheet, "tcs.density=0.99"), 0, InfillKind::Tcs); }),
+              HasSubstr("no walls give a density of 0.99"));
+}
+
+TEST(CheckRecipe, OfAGradedCrystalBothEndsCount) {
+  const Recipe graded = set(set(Recipe{}, "tcs.grade=surface"), "tcs.grade_least=0.5");
+  const auto refused = [&](const char* change) {
+    return refusal([&] { check_recipe(set(graded, change), 0.2, InfillKind::Tcs); });
+  };
+  EXPECT_EQ(refused("tcs.grade_most=1.8"), "");
+  EXPECT_DOUBLE_EQ(thinnest_mm(graded, InfillKind::Tcs), 0.4);
+  EXPECT_THAT(refused("tcs.grade_most=2"), HasSubstr("tcs.cell_mm is 6, too small for sticks of 1.6"));
+  EXPECT_THAT(refused("tcs.grade_most=0.4"), HasSubstr("use 0.5 or more (tcs.grade_least)"));
+  EXPECT_THAT(refused("tcs.grade_depth_mm=5"), HasSubstr("use 6 or more (tcs.cell_mm)"));
+  EXPECT_THAT(refused("tcs.grade_least=0.3"), HasSubstr("thinner than 2 voxels"));
 }
 
 TEST(CheckRecipe, OnlyWhatTheInfillUsesMatters) {

@@ -6,151 +6,369 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "fibrolite/error.h"
+#include "fibrolite/ops/text.h"
+#include "nodal.h"
+#include "sticks.h"
 
 namespace fibrolite {
 namespace {
 
-/// Exact distance to the diamond lattice in O(1), by folding.
-///
-/// In quarter cells the nodes are A, the points with even coordinates whose sum is divisible by 4, and B = A + (1,1,1);
-/// each A node has bonds to A + {(1,1,1), (1,-1,-1), (-1,1,-1), (-1,-1,1)}. The lattice is mapped onto itself by moving
-/// along A, by any permutation of the axes and by flipping two signs. So a point is moved into the Voronoi cell of the
-/// A node at the origin and then folded to x >= y >= |z|; there the nearest bond is always the one from (0,0,0) to
-/// (1,1,1). Stretched along z only x and y may be exchanged, and one of four bonds is nearest.
-struct Crystal final : Shape::Function {
-  explicit Crystal(const TcsParams& p)
-      : quarter(static_cast<float>(0.25 * p.cell_mm)),
-        stretch(p.stretch_z ? std::numbers::sqrt2_v<float> : 1.0F),
-        stick(static_cast<float>(0.5 * p.stick_mm)),
-        ball(static_cast<float>(0.5 * p.ball_mm)),
-        shift(p.shift_mm) {}
-
-  void evaluate(const PointBlock& block, float* out) const override {
-    const auto sx = static_cast<float>(shift.x), sy = static_cast<float>(shift.y), sz = static_cast<float>(shift.z);
-    if (stretch == 1.0F) {
-      cubic(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stick, ball, out);
-    } else {
-      stretched(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stretch, stick, ball, out);
-    }
-  }
-
-  struct Folded {
-    float a, b, c;  // |coordinate| in the Voronoi cell of the origin, quarter cells, axes in place
-    float sign;     // of the product of the coordinates
-  };
-  /// The two ways to the nearest even number without a call: the constant pushes the fraction out of the mantissa.
-  static float nearest_even(float v) {
-    constexpr float push = 12582912.0F;  // 1.5 * 2^23
-    return 2.0F * ((0.5F * v + push) - push);
-  }
-  static Folded fold(float x, float y, float z) {
-    const float ex = nearest_even(x), ey = nearest_even(y), ez = nearest_even(z);
-    const float rx = x - ex, ry = y - ey, rz = z - ez;
-    float a = std::abs(rx), b = std::abs(ry), c = std::abs(rz);
-    float sign = (rx < 0 ? -1.0F : 1.0F) * (ry < 0 ? -1.0F : 1.0F) * (rz < 0 ? -1.0F : 1.0F);
-    // Even corners with an odd half sum are no A nodes: step over along the axis with the largest remainder.
-    const bool odd = (static_cast<int>(0.5F * (ex + ey + ez)) & 1) != 0;
-    const float largest = std::max(a, std::max(b, c));
-    const bool step_a = odd && a == largest, step_b = odd && !step_a && b == largest,
-               step_c = odd && !step_a && !step_b;
-    a = step_a ? 2.0F - a : a;
-    b = step_b ? 2.0F - b : b;
-    c = step_c ? 2.0F - c : c;
-    sign = odd ? -sign : sign;
-    return {a, b, c, sign};
-  }
-
-  [[gnu::target_clones("avx2", "default")]] static void cubic(const float* px, const float* py, const float* pz,
-                                                              int count, float sx, float sy, float sz, float quarter,
-                                                              float stick, float ball, float* out) {
-    const float inverse = 1.0F / quarter;
-    for (int i = 0; i < count; ++i) {
-      const Folded f = fold((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse);
-      const float high = std::max(f.a, std::max(f.b, f.c)), low = std::min(f.a, std::min(f.b, f.c));
-      const float x = high, y = f.a + f.b + f.c - high - low, z = low * f.sign;
-      const float t = std::min(std::max((x + y + z) * (1.0F / 3.0F), 0.0F), 1.0F);
-      const float bond = (x - t) * (x - t) + (y - t) * (y - t) + (z - t) * (z - t);
-      const float node = std::min(x * x + y * y + z * z, (x - 1) * (x - 1) + (y - 1) * (y - 1) + (z - 1) * (z - 1));
-      out[i] = std::min(std::sqrt(bond) * quarter - stick, std::sqrt(node) * quarter - ball);
-    }
-  }
-
-  /// Squared distance from p to the bond from a along d, z stretched by k.
-  static float bond2(float x, float y, float z, float ax, float ay, float az, float dx, float dy, float dz, float k) {
-    const float px = x - ax, py = y - ay, pz = (z - az) * k, qz = dz * k;
-    const float t = std::min(std::max((px * dx + py * dy + pz * qz) / (dx * dx + dy * dy + qz * qz), 0.0F), 1.0F);
-    const float ux = px - t * dx, uy = py - t * dy, uz = pz - t * qz;
-    return ux * ux + uy * uy + uz * uz;
-  }
-
-  static void stretched(const float* px, const float* py, const float* pz, int count, float sx, float sy, float sz,
-                        float quarter, float k, float stick, float ball, float* out) {
-    const float inverse = 1.0F / quarter;
-    for (int i = 0; i < count; ++i) {
-      const Folded f = fold((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse / k);
-      const float x = std::max(f.a, f.b), y = std::min(f.a, f.b), z = f.c * f.sign;
-      const float bond =
-          std::min(std::min(bond2(x, y, z, 0, 0, 0, 1, 1, 1, k), bond2(x, y, z, 0, 0, 0, 1, -1, -1, k)),
-                   std::min(bond2(x, y, z, 2, 0, -2, -1, -1, 1, k), bond2(x, y, z, 2, 0, 2, -1, 1, -1, k)));
-      const float node = std::min(x * x + y * y + k * k * z * z,
-                                  std::min((x - 1) * (x - 1) + (y - 1) * (y - 1) + k * k * (z - 1) * (z - 1),
-                                           (x - 1) * (x - 1) + (y + 1) * (y + 1) + k * k * (z + 1) * (z + 1)));
-      out[i] = std::min(std::sqrt(bond) * quarter - stick, std::sqrt(node) * quarter - ball);
-    }
-  }
-
-  float quarter, stretch, stick, ball;
+/// One side of a level set.
+struct Network final : Shape::Function {
+  Network(const CellEdges& cell, double level, Vec3d shift_mm) : table(cell, level), shift(shift_mm) {}
+  void evaluate(const PointBlock& block, float* out) const override { table.evaluate(block, shift, out); }
+  [[nodiscard]] double lipschitz() const override { return DistanceTable::lipschitz; }
+  DistanceTable table;
   Vec3d shift;
 };
 
+/// Both sides of the membrane, equally thick.
+struct Sheet final : Shape::Function {
+  Sheet(const CellEdges& cell, double wall_mm, Vec3d shift_mm)
+      : table(cell, 0), half(static_cast<float>(0.5 * wall_mm)), shift(shift_mm) {}
+  void evaluate(const PointBlock& block, float* out) const override {
+    table.evaluate(block, shift, out);
+    for (int i = 0; i < block.count; ++i) out[i] = std::abs(out[i]) - half;
+  }
+  [[nodiscard]] double lipschitz() const override { return DistanceTable::lipschitz; }
+  DistanceTable table;
+  float half;
+  Vec3d shift;
+};
+
+using Values = std::array<float, PointBlock::capacity>;
+
+/// Distances to lines, points or a surface, less a radius that is `thickness` times a given one.
+struct Graded final : Shape::Function {
+  struct Member {
+    Shape middle;
+    double radius_mm;
+  };
+  Graded(std::vector<Member> list, Shape factors) : members(std::move(list)), thickness(std::move(factors)) {}
+  void evaluate(const PointBlock& block, float* out) const override {
+    Values factor, value;
+    thickness.evaluate(block, factor.data());
+    std::fill_n(out, block.count, far_mm);
+    for (const Member& m : members) {
+      m.middle.evaluate(block, value.data());
+      const auto radius = static_cast<float>(m.radius_mm);
+      for (int i = 0; i < block.count; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        out[i] = std::min(out[i], value[k] - radius * factor[k]);
+      }
+    }
+  }
+  [[nodiscard]] double lipschitz() const override {
+    double steepest = 0;
+    for (const Member& m : members)
+      steepest = std::max(steepest, m.middle.lipschitz() + m.radius_mm * thickness.lipschitz());
+    return steepest;
+  }
+  std::vector<Member> members;
+  Shape thickness;
+};
+
+/// Networks of thicknesses evenly spaced from grade_least to grade_most; linear between the two that are next.
+struct Between final : Shape::Function {
+  Between(std::vector<Shape> list, Shape factors, const TcsParams& p)
+      : networks(std::move(list)),
+        thickness(std::move(factors)),
+        least(p.grade_least),
+        step((p.grade_most - p.grade_least) / static_cast<double>(networks.size() - 1)),
+        stick_mm(p.stick_mm) {}
+  void evaluate(const PointBlock& block, float* out) const override {
+    Values place, value;
+    thickness.evaluate(block, place.data());
+    std::fill_n(out, block.count, 0.0F);
+    const auto count = static_cast<std::size_t>(block.count);
+    const auto top = static_cast<float>(networks.size() - 1), from = static_cast<float>(least);
+    const float per_step = step > 0 ? static_cast<float>(1 / step) : 0;
+    for (std::size_t i = 0; i < count; ++i) place[i] = std::clamp((place[i] - from) * per_step, 0.0F, top);
+    const auto [low, high] = std::minmax_element(place.begin(), place.begin() + block.count);
+    const auto first = static_cast<std::size_t>(*low), last = static_cast<std::size_t>(std::ceil(*high));
+    for (std::size_t n = first; n <= last; ++n) {
+      networks[n].evaluate(block, value.data());
+      for (std::size_t i = 0; i < count; ++i)
+        out[i] += value[i] * std::max(0.0F, 1 - std::abs(place[i] - static_cast<float>(n)));
+    }
+  }
+  /// A thicker network's surface lies outside a thinner one's by less than its neck is thicker.
+  [[nodiscard]] double lipschitz() const override {
+    return DistanceTable::lipschitz + stick_mm * thickness.lipschitz();
+  }
+  std::vector<Shape> networks;
+  Shape thickness;
+  double least, step, stick_mm;
+};
+
+/// grade_most at the inner face of the shell, falling evenly to grade_least.
+struct ByDepth final : Shape::Function {
+  ByDepth(const TcsParams& p, Shape distance, double shell_mm)
+      : body(std::move(distance)),
+        least(static_cast<float>(p.grade_least)),
+        most(static_cast<float>(p.grade_most)),
+        shell(static_cast<float>(shell_mm)),
+        depth(static_cast<float>(p.grade_depth_mm)) {}
+  void evaluate(const PointBlock& block, float* out) const override {
+    body.evaluate(block, out);
+    for (int i = 0; i < block.count; ++i)
+      out[i] = most + (least - most) * std::clamp((-out[i] - shell) / depth, 0.0F, 1.0F);
+  }
+  [[nodiscard]] double lipschitz() const override {
+    return static_cast<double>((most - least) / depth) * body.lipschitz();
+  }
+  Shape body;
+  float least, most, shell, depth;
+};
+
+CellEdges cell_of(const TcsParams& p) {
+  return {p.cell_mm.x, p.cell_mm.y, p.cell_mm.z * (p.stretch_z ? std::numbers::sqrt2 : 1)};
+}
+
+/// The lattice's own axes.
+Frame lattice(const TcsParams& p) {
+  const auto turned = [&](Vec3d v) {
+    const double to_rad = std::numbers::pi / 180;
+    const double a = p.rotate_deg.x * to_rad, b = p.rotate_deg.y * to_rad, c = p.rotate_deg.z * to_rad;
+    v = {v.x, std::cos(a) * v.y - std::sin(a) * v.z, std::sin(a) * v.y + std::cos(a) * v.z};
+    v = {std::cos(b) * v.x + std::sin(b) * v.z, v.y, std::cos(b) * v.z - std::sin(b) * v.x};
+    return Vec3d{std::cos(c) * v.x - std::sin(c) * v.y, std::sin(c) * v.x + std::cos(c) * v.y, v.z};
+  };
+  return {p.shift_mm, turned({1, 0, 0}), turned({0, 1, 0}), turned({0, 0, 1})};
+}
+
+bool is_turned(const TcsParams& p) { return !(p.rotate_deg == Vec3d{}); }
+
+Shape in_lattice(const TcsParams& p, Vec3d shift) {
+  const CellEdges cell = cell_of(p);
+  switch (p.form) {
+    case TcsForm::Sticks:
+      return sticks_and_balls(cell, {0.5 * p.stick_mm, 0.5 * p.ball_mm}, shift);
+    case TcsForm::Network:
+      return Shape(std::make_shared<const Network>(cell, neck_level(cell, p.stick_mm), shift));
+    case TcsForm::Sheet:
+      return Shape(std::make_shared<const Sheet>(cell, p.wall_mm, shift));
+  }
+  return nothing();
+}
+
+/// Of a sheet by Weyl's tube formula: area times thickness, less what the curvature takes. The membrane has an Euler
+/// number of -16 in a cell (genus 3 in the smallest cell, a quarter of the cube), whatever its edges.
+double sheet_density(const CellEdges& cell, double wall_mm, double area_mm2) {
+  const double curvature = 2 * std::numbers::pi * -16;
+  return (area_mm2 * wall_mm + curvature * wall_mm * wall_mm * wall_mm / 12) / (cell.x * cell.y * cell.z);
+}
+
+/// Of balls and sticks, by sampling a brick of the cell (see DistanceTable).
+double sticks_density(const TcsParams& p) {
+  const CellEdges cell = cell_of(p);
+  const Shape shape = in_lattice(p, {});
+  constexpr int samples = 40;
+  const Vec3d step{cell.x / (2 * samples), cell.y / (2 * samples), cell.z / (2 * samples)};
+  const double size = std::cbrt(step.x * step.y * step.z);
+  std::array<Vec3d, 2 * samples> row;
+  std::array<float, 2 * samples> value{};
+  double inside = 0;
+  for (int i = 0; i < samples; ++i)
+    for (int j = 0; j < samples; ++j) {
+      for (std::size_t k = 0; k < row.size(); ++k)
+        row[k] = {(i + 0.5) * step.x, (j + 0.5) * step.y, (static_cast<double>(k) + 0.5) * step.z};
+      shape.evaluate(row, value);
+      for (const float v : value) inside += std::clamp(0.5 - v / size, 0.0, 1.0);
+    }
+  return inside / (2.0 * samples * samples * samples);
+}
+
+/// Share of material; `membrane` is the sheet's area in a cell, so that a search need not measure it again.
+double measured(const TcsParams& p, double membrane) {
+  switch (p.form) {
+    case TcsForm::Sticks:
+      return sticks_density(p);
+    case TcsForm::Network:
+      return network_density(neck_level(cell_of(p), p.stick_mm));
+    case TcsForm::Sheet:
+      return sheet_density(cell_of(p), p.wall_mm, membrane);
+  }
+  return 0;
+}
+
+/// Members `scale` times as thick.
+TcsParams scaled(TcsParams p, double scale) {
+  p.stick_mm *= scale;
+  p.ball_mm *= scale;
+  p.wall_mm *= scale;
+  return p;
+}
+
+double member_mm(const TcsParams& p) { return p.form == TcsForm::Sheet ? p.wall_mm : p.stick_mm; }
+
+[[noreturn]] void refuse(const std::string& what, const char* key, const std::string& hint = {}) {
+  throw Error(Code::BadRecipe, what, key, hint);
+}
+
+void check_cell(const TcsParams& p) {
+  const CellEdges& cell = p.cell_mm;
+  if (!(cell.least() > 0) || !(cell.most() <= 3 * cell.least()))
+    refuse("the edges of the cell must be positive and none more than 3 times another", "tcs.cell_mm");
+}
+
 void check(const TcsParams& p) {
-  if (!(p.stick_mm > 0)) throw Error(Code::BadRecipe, "the stick diameter must be positive", "tcs.stick_mm");
-  if (!(p.ball_mm >= p.stick_mm)) {
-    throw Error(Code::BadRecipe, "balls are thinner than sticks", "tcs.ball_mm", "use tcs.stick_mm or more");
-  }
-  if (!(p.cell_mm >= 4 * p.stick_mm)) {
-    throw Error(Code::BadRecipe, "the cell is too small for its sticks", "tcs.cell_mm", "use 4 * tcs.stick_mm or more");
-  }
+  check_cell(p);
+  const bool sheet = p.form == TcsForm::Sheet;
+  const std::string key = sheet ? "tcs.wall_mm" : "tcs.stick_mm";
+  if (!(member_mm(p) > 0)) refuse("must be above zero", key.c_str());
+  if (p.form == TcsForm::Sticks && !(p.ball_mm >= p.stick_mm))
+    refuse("balls are thinner than sticks", "tcs.ball_mm", "use tcs.stick_mm or more");
+  const double times = cell_per_member(p.form);
+  if (!(p.cell_mm.least() >= times * members(p).most_mm * (1 - 1e-12)))
+    refuse(sheet ? "the cell is too small for its walls" : "the cell is too small for its sticks", "tcs.cell_mm",
+           "use " + number_text(times) + " times " + key + " or more");
+  if (p.grade == TcsGrade::None) return;
+  if (!(p.grade_least > 0) || !(p.grade_most >= p.grade_least))
+    refuse("must be above zero, and grade_most no less", "tcs.grade_least");
+  if (!(p.grade_depth_mm >= p.cell_mm.most()))
+    refuse("thickness may not change within less than a cell", "tcs.grade_depth_mm", "use tcs.cell_mm or more");
+}
+
+void visit_sticks(const TcsParams& p, const Box3d& box, const std::function<void(const Capsule&)>& visit) {
+  const CellEdges cell = cell_of(p);
+  const Frame frame = lattice(p);
+  Box3d local;
+  for (int corner = 0; corner < 8; ++corner)
+    local.include(frame.to_local({(corner & 1) != 0 ? box.max.x : box.min.x, (corner & 2) != 0 ? box.max.y : box.min.y,
+                                  (corner & 4) != 0 ? box.max.z : box.min.z}));
+  // Even coordinates from one stick before the box to one after it.
+  const auto first = [](double low, double edge) {
+    return 2 * static_cast<int>(std::floor(0.5 * (4 * low / edge - 1)));
+  };
+  const auto last = [](double high, double edge) { return static_cast<int>(std::ceil(4 * high / edge + 1)); };
+  const auto place = [&](Vec3i q) {
+    return frame.to_world({0.25 * cell.x * q.x, 0.25 * cell.y * q.y, 0.25 * cell.z * q.z});
+  };
+  each_diamond_bond(
+      {first(local.min.x, cell.x), first(local.min.y, cell.y), first(local.min.z, cell.z)},
+      {last(local.max.x, cell.x), last(local.max.y, cell.y), last(local.max.z, cell.z)}, [&](Vec3i node, Vec3i along) {
+        visit({place(node), place({node.x + along.x, node.y + along.y, node.z + along.z}), 0.5 * p.stick_mm});
+      });
+}
+
+Fill filled(const TcsParams& p, Shape shape, const std::optional<Shape>& thickness) {
+  Fill fill{.shape = std::move(shape)};
+  if (p.form == TcsForm::Sheet) return fill;  // a membrane has no tips
+  TcsParams seen = p;
+  if (p.form == TcsForm::Network) seen.stick_mm = seen.ball_mm = bulge_mm(cell_of(p), p.stick_mm);  // it has no sides
+  fill.sticks = [seen, thickness](const Box3d& box, const std::function<void(const Capsule&)>& visit) {
+    visit_sticks(seen, box, [&](Capsule stick) {
+      if (thickness) stick.radius_mm *= (*thickness)(0.5 * (stick.a + stick.b));
+      visit(stick);
+    });
+  };
+  fill.ball_mm = seen.ball_mm * (thickness ? p.grade_most : 1);
+  return fill;
 }
 
 }  // namespace
 
+MemberRange members(const TcsParams& params) {
+  const double given = member_mm(sized(params));
+  if (params.grade == TcsGrade::None) return {given, given};
+  return {params.grade_least * given, params.grade_most * given};
+}
+
+double density(const TcsParams& params) {
+  const TcsParams p = sized(params);
+  check(p);
+  return measured(p, p.form == TcsForm::Sheet ? membrane_mm2(cell_of(p)) : 0);
+}
+
+TcsParams sized(const TcsParams& params) {
+  if (!params.density) return params;
+  TcsParams p = params;
+  p.density.reset();
+  check_cell(p);
+  const double wanted = *params.density;
+  const double area = p.form == TcsForm::Sheet ? membrane_mm2(cell_of(p)) : 0;
+  const auto of = [&](double scale) { return measured(scaled(p, scale), area); };
+  // The thickest members a cell may have, and the thinnest worth a name; density rises with thickness.
+  double high = p.cell_mm.least() / cell_per_member(p.form) / members(p).most_mm, low = 0.04 * high;
+  const double most = of(high), least = of(low);
+  if (!(wanted >= least && wanted <= most))
+    refuse(std::string("no ")
+               .append(p.form == TcsForm::Sheet ? "walls" : "sticks")
+               .append(" give a density of ")
+               .append(number_text(wanted)),
+           "tcs.density",
+           std::string("use ")
+               .append(number_text(std::ceil(1000 * least) / 1000))
+               .append(" to ")
+               .append(number_text(std::floor(1000 * most) / 1000)));
+  for (int i = 0; i < 16; ++i) {
+    const double middle = 0.5 * (low + high);
+    (of(middle) < wanted ? low : high) = middle;
+  }
+  return scaled(p, 0.5 * (low + high));
+}
+
 Shape crystal(const TcsParams& params) {
-  check(params);
-  return Shape(std::make_shared<const Crystal>(params));
+  const TcsParams p = sized(params);
+  check(p);
+  return is_turned(p) ? placed(in_lattice(p, {}), lattice(p)) : in_lattice(p, p.shift_mm);
+}
+
+Shape crystal(const TcsParams& params, const Shape& thickness) {
+  const TcsParams p = sized(params);
+  check(p);
+  // Sizes are taken off distances to what has none; for a network, which has no such middle, between several sizes.
+  const auto of = [&](const auto& change) {
+    TcsParams other = p;
+    change(other);
+    return is_turned(p) ? placed(in_lattice(other, {}), lattice(p)) : in_lattice(other, p.shift_mm);
+  };
+  constexpr double none = -2 * far_mm;
+  std::vector<Graded::Member> list;
+  switch (p.form) {
+    case TcsForm::Sticks:
+      list.push_back({of([](TcsParams& q) { q.stick_mm = 0, q.ball_mm = none; }), 0.5 * p.stick_mm});
+      list.push_back({of([](TcsParams& q) { q.stick_mm = none, q.ball_mm = 0; }), 0.5 * p.ball_mm});
+      break;
+    case TcsForm::Sheet:
+      list.push_back({of([](TcsParams& q) { q.wall_mm = 0; }), 0.5 * p.wall_mm});
+      break;
+    case TcsForm::Network: {
+      constexpr int sizes = 5;
+      std::vector<Shape> network;
+      for (int i = 0; i < sizes; ++i)
+        network.push_back(
+            of([&](TcsParams& q) { q.stick_mm *= p.grade_least + (p.grade_most - p.grade_least) * i / (sizes - 1); }));
+      return Shape(std::make_shared<const Between>(std::move(network), thickness, p));
+    }
+  }
+  return Shape(std::make_shared<const Graded>(std::move(list), thickness));
+}
+
+Shape thicker_at_surface(const TcsParams& params, const Shape& body, double shell_mm) {
+  return Shape(std::make_shared<const ByDepth>(params, body, shell_mm));
 }
 
 void each_stick(const TcsParams& params, const Box3d& box, const std::function<void(const Capsule&)>& visit) {
-  check(params);
-  const double quarter = 0.25 * params.cell_mm, stretch = params.stretch_z ? std::numbers::sqrt2 : 1;
-  const Vec3d unit{quarter, quarter, stretch * quarter};
-  const auto place = [&](int x, int y, int z) { return params.shift_mm + Vec3d{x * unit.x, y * unit.y, z * unit.z}; };
-  // Even coordinates from one stick before the box to one after it.
-  const auto first = [&](double low, double shift, double step) {
-    return 2 * static_cast<int>(std::floor(0.5 * ((low - shift) / step - 1)));
-  };
-  const auto last = [&](double high, double shift, double step) {
-    return static_cast<int>(std::ceil((high - shift) / step + 1));
-  };
-  constexpr std::array<std::array<int, 3>, 4> bonds{{{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}};
-  for (int x = first(box.min.x, params.shift_mm.x, unit.x); x <= last(box.max.x, params.shift_mm.x, unit.x); x += 2)
-    for (int y = first(box.min.y, params.shift_mm.y, unit.y); y <= last(box.max.y, params.shift_mm.y, unit.y); y += 2)
-      for (int z = first(box.min.z, params.shift_mm.z, unit.z); z <= last(box.max.z, params.shift_mm.z, unit.z);
-           z += 2) {
-        if (((x + y + z) / 2) % 2 != 0) continue;
-        for (const auto& b : bonds) visit({place(x, y, z), place(x + b[0], y + b[1], z + b[2]), 0.5 * params.stick_mm});
-      }
+  const TcsParams p = sized(params);
+  check(p);
+  visit_sticks(p, box, visit);
 }
 
 Fill generate(const Part&, const TcsParams& params) {
-  Fill fill{.shape = crystal(params)};
-  fill.sticks = [params](const Box3d& box, const std::function<void(const Capsule&)>& visit) {
-    each_stick(params, box, visit);
-  };
-  fill.ball_mm = params.ball_mm;
-  return fill;
+  const TcsParams p = sized(params);
+  return filled(p, crystal(p), {});
+}
+
+Fill generate(const Part&, const TcsParams& params, const Shape& thickness) {
+  const TcsParams p = sized(params);
+  return filled(p, crystal(p, thickness), thickness);
 }
 
 }  // namespace fibrolite

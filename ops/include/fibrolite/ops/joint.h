@@ -55,8 +55,9 @@ struct Joint {
   std::vector<std::string> warnings;
 };
 /// Support columns run along the interface's normal from the layer into each side's crystal (`crystal_a`, `crystal_b`:
-/// whether that side's fill is made of sticks). `stick_mm`: stick diameter, how deep a column must end in material.
-/// Random numbers: hash(seed, "joint", index). Cost: O(section pixels). Source: paper Sec. 6.
+/// whether that side's fill is a crystal). `stick_mm`: thickness of its thinnest members, a quarter of which is how
+/// deep a column must end in material. Random numbers: hash(seed, "joint", index). Cost: O(section pixels). Source:
+/// paper Sec. 6.
 [[nodiscard]] Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b, bool crystal_a,
                          bool crystal_b, double stick_mm, const Shape& body, double shell_mm, std::uint64_t seed,
                          int index, const JointParams& params, const Context& context = {});
