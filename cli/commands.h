@@ -9,6 +9,7 @@ namespace fibrolite::cli {
 void add_generate_command(CLI::App& program);
 void add_partition_command(CLI::App& program);
 void add_verify_command(CLI::App& program);
+void add_slice_command(CLI::App& program);
 void add_check_command(CLI::App& program);
 void add_recipe_command(CLI::App& program);
 

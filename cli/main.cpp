@@ -59,6 +59,7 @@ int run(int argc, char** argv) {
   add_generate_command(program);
   add_partition_command(program);
   add_verify_command(program);
+  add_slice_command(program);
   add_check_command(program);
   add_recipe_command(program);
   check_command_name(program, argc, argv);

@@ -206,7 +206,11 @@ void add_options(CLI::App& command, OutputOptions& options, const std::vector<st
 }
 
 void add_voxel(CLI::App& command, std::optional<double>& voxel_mm, const std::string& help) {
-  add_positive(command, "--voxel", voxel_mm, help)->type_name("MM");
+  add_length(command, "--voxel", voxel_mm, help);
+}
+
+void add_length(CLI::App& command, const std::string& name, std::optional<double>& length_mm, const std::string& help) {
+  add_positive(command, name, length_mm, help)->type_name("MM");
 }
 
 std::string_view name_of(InfillKind kind) {

@@ -54,6 +54,8 @@ void add_options(CLI::App& command, RunOptions& options);
 /// `endings`: what an output may end with, lower case, with the dot.
 void add_options(CLI::App& command, OutputOptions& options, const std::vector<std::string>& endings);
 void add_voxel(CLI::App& command, std::optional<double>& voxel_mm, const std::string& help);
+/// A length above 0, mm.
+void add_length(CLI::App& command, const std::string& name, std::optional<double>& length_mm, const std::string& help);
 void add_infill(CLI::App& command, InfillKind& kind);
 [[nodiscard]] std::string_view name_of(InfillKind kind);
 /// An extra output with one fixed ending.

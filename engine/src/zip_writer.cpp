@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <limits>
+#include <utility>
 
 #include "fibrolite/error.h"
 #include "mesh_formats.h"
@@ -12,7 +13,7 @@ namespace fibrolite {
 namespace {
 
 constexpr std::uint32_t local_signature = 0x04034b50, directory_signature = 0x02014b50, end_signature = 0x06054b50;
-constexpr std::uint16_t version = 20, method_deflate = 8;
+constexpr std::uint16_t version = 20, method_store = 0, method_deflate = 8;
 constexpr std::uint16_t time = 0, date = 0x21;  // 1980-01-01 00:00, the earliest a zip can say
 // Twice the speed of the default for a twentieth more bytes on this kind of text.
 constexpr int level = 4;
@@ -20,11 +21,12 @@ constexpr int level = 4;
 constexpr std::string_view end_of_stream{"\x03\x00", 2};
 
 // The fields that the local header and the directory share.
-std::string common_fields(std::uint32_t crc, std::uint32_t size, std::uint32_t raw_size, std::size_t name_size) {
+std::string common_fields(std::uint16_t method, std::uint32_t crc, std::uint32_t size, std::uint32_t raw_size,
+                          std::size_t name_size) {
   std::string text;
   append_bytes(text, version);
   append_bytes(text, std::uint16_t{0});  // flags
-  append_bytes(text, method_deflate);
+  append_bytes(text, method);
   append_bytes(text, time);
   append_bytes(text, date);
   append_bytes(text, crc);
@@ -37,7 +39,8 @@ std::string common_fields(std::uint32_t crc, std::uint32_t size, std::uint32_t r
 
 std::uint32_t narrow(std::uint64_t value) {
   if (value >= std::numeric_limits<std::uint32_t>::max())
-    throw Error(Code::TooLarge, "the 3MF would be larger than 4 GB", "", "write .stl or .ply, or use larger voxels");
+    throw Error(Code::TooLarge, "the archive would be larger than 4 GB", "",
+                "write another format, or use larger voxels or pixels");
   return static_cast<std::uint32_t>(value);
 }
 
@@ -64,6 +67,14 @@ DeflatedPiece deflate_piece(std::string_view text) {
   return piece;
 }
 
+DeflatedPiece stored_piece(std::string bytes) {
+  DeflatedPiece piece;
+  piece.raw_size = bytes.size();
+  piece.crc = static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+  piece.bytes = std::move(bytes);
+  return piece;
+}
+
 void ZipWriter::add(const std::string& name, const std::vector<DeflatedPiece>& pieces) {
   std::uint64_t size = end_of_stream.size(), raw_size = 0;
   uLong crc = 0;
@@ -72,8 +83,21 @@ void ZipWriter::add(const std::string& name, const std::vector<DeflatedPiece>& p
     raw_size += piece.raw_size;
     crc = crc32_combine(crc, piece.crc, static_cast<z_off_t>(piece.raw_size));
   }
-  const std::string fields =
-      common_fields(static_cast<std::uint32_t>(crc), narrow(size), narrow(raw_size), name.size());
+  begin_entry(name, method_deflate, static_cast<std::uint32_t>(crc), size, raw_size);
+  for (const DeflatedPiece& piece : pieces) file_->write(piece.bytes);
+  file_->write(end_of_stream);
+}
+
+void ZipWriter::add_stored(const std::string& name, const DeflatedPiece& piece) {
+  begin_entry(name, method_store, piece.crc, piece.bytes.size(), piece.raw_size);
+  file_->write(piece.bytes);
+}
+
+void ZipWriter::begin_entry(const std::string& name, std::uint16_t method, std::uint32_t crc, std::uint64_t size,
+                            std::uint64_t raw_size) {
+  if (entries_ == std::numeric_limits<std::uint16_t>::max())
+    throw Error(Code::TooLarge, "the archive would have more than 65535 entries");
+  const std::string fields = common_fields(method, crc, narrow(size), narrow(raw_size), name.size());
   std::string header;
   append_bytes(header, local_signature);
   header += fields + name;
@@ -87,8 +111,6 @@ void ZipWriter::add(const std::string& name, const std::vector<DeflatedPiece>& p
   ++entries_;
 
   file_->write(header);
-  for (const DeflatedPiece& piece : pieces) file_->write(piece.bytes);
-  file_->write(end_of_stream);
   offset_ += header.size() + size;
 }
 

@@ -19,19 +19,25 @@ struct DeflatedPiece {
   std::size_t raw_size = 0;
 };
 DeflatedPiece deflate_piece(std::string_view text);
+/// As it is: for what is compressed already.
+DeflatedPiece stored_piece(std::string bytes);
 
 /// Why not libzip: it deflates on one thread and needs the whole text at once; a 3MF of 12 million triangles is 0.9 GB
 /// of text.
 class ZipWriter {
  public:
   explicit ZipWriter(OutputFile& file) : file_(&file) {}
-  /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB or more.
+  /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB, or 65536 entries.
   void add(const std::string& name, const std::vector<DeflatedPiece>& pieces);
   void add(const std::string& name, std::string_view text) { add(name, {deflate_piece(text)}); }
+  /// One stored_piece() as an entry.
+  void add_stored(const std::string& name, const DeflatedPiece& piece);
   /// The directory. Last.
   void finish();
 
  private:
+  void begin_entry(const std::string& name, std::uint16_t method, std::uint32_t crc, std::uint64_t size,
+                   std::uint64_t raw_size);
   OutputFile* file_;
   std::uint64_t offset_ = 0;
   std::string directory_;

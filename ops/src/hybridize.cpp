@@ -10,6 +10,7 @@
 #include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/tie.h"
 #include "fibrolite/realize.h"
+#include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
 #include "fibrolite/winding.h"
 #include "run.h"
@@ -89,6 +90,10 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     report_solid(tied, body, recipe.material, report);
     report_weak_places(out.parts, fills, body, out.solid, recipe, params.infill, report, c);
   });
+  if (params.function) {
+    const Shape smooth = compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, assembly);
+    out.printed = as_function(smooth, body, tied);
+  }
   if (params.steps) out.steps = steps(body, raw, out, fills, tied.struts, assembly);
   return out;
 }

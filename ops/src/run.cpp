@@ -2,7 +2,11 @@
 #include "run.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
 
+#include "fibrolite/blocks.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
 
@@ -66,6 +70,39 @@ Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fi
   std::vector<Shape> shapes;
   for (const Joint& joint : joints) shapes.push_back(joint.shape);
   return assemble(body, filled, shapes, params);
+}
+
+Shape as_function(const Shape& whole, const Solid& body, const Tied& tied) {
+  const Shape b = distance_to(body), solid = distance_to(tied.solid);
+  const Shape made = tied.struts.empty() ? whole : unite({whole, intersect({b, capsules(tied.struts)})});
+
+  // Samples on which function and solid differ: a ball about each, which covers the cells around it.
+  struct Differing {
+    std::vector<Capsule> specks, pores;
+  };
+  const double voxel = body.grid().voxel_mm, radius = 0.5 * std::numbers::sqrt3 * voxel;
+  const auto rounding = static_cast<float>(1e-3 * voxel);
+  const std::vector<Vec3i> origins = blocks(body);
+  std::vector<Differing> differing(origins.size());
+  for_each_block(origins, voxel, [&](std::size_t number, const PointBlock& block) {
+    std::array<float, PointBlock::capacity> f, s;
+    made.evaluate(block, f.data());
+    solid.evaluate(block, s.data());
+    for (std::size_t k = 0; k < f.size(); ++k) {
+      if ((f[k] < 0) == (s[k] < 0) || std::abs(f[k]) < rounding) continue;
+      const Vec3d at{block.x[k], block.y[k], block.z[k]};
+      (s[k] < 0 ? differing[number].pores : differing[number].specks).push_back({at, at, radius});
+    }
+  });
+  Differing all;
+  for (const Differing& one : differing) {
+    all.specks.insert(all.specks.end(), one.specks.begin(), one.specks.end());
+    all.pores.insert(all.pores.end(), one.pores.begin(), one.pores.end());
+  }
+  Shape result = made;
+  if (!all.pores.empty()) result = unite({result, intersect({b, capsules(all.pores)})});
+  if (!all.specks.empty()) result = subtract(result, capsules(all.specks));
+  return result;
 }
 
 std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made, const std::vector<Fill>& fills,

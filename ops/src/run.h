@@ -50,6 +50,9 @@ class Run {
 
 [[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
                             const std::vector<Joint>& joints, InfillKind infill, const AssembleParams& params);
+/// The printed solid as a function: the composed shape with its ties, mended wherever a sample of the solid says
+/// otherwise (specks that went, pores that were filled).
+[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Tied& tied);
 /// Every step as a grid of its own (see Hybrid::steps).
 [[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
                                             const std::vector<Fill>& fills, const std::vector<Capsule>& struts,

@@ -24,6 +24,7 @@ struct HybridizeParams {
   InfillKind infill = InfillKind::Hybrid;
   std::optional<double> voxel_mm;  ///< Default: min(longest side / 400, thinnest feature / 3).
   bool steps = false;              ///< Also realize every step as a grid of its own.
+  bool function = false;           ///< Also give the solid as a distance function (Hybrid::printed).
 };
 struct Hybrid {
   Solid solid;  ///< The printed solid.
@@ -34,7 +35,10 @@ struct Hybrid {
   /// If asked for: body, shell, fill_<part>, joint_<n>, ties, specks (removed), pores (filled), solid. The union of
   /// shell, fills, joints, ties and pores less the specks is the solid.
   std::vector<NamedSolid> steps;
-  Shape body;         ///< Distance to the model, as far in as the shell goes.
+  Shape body;  ///< Distance to the model, as far in as the shell goes.
+  /// If asked for: the solid as a function, sharper than its voxels: body, shell, fills, joints and ties as composed,
+  /// less the specks, with the pores filled. It holds the body's distance and no grid of the solid.
+  Shape printed;
   StressField field;  ///< If recipe.verify.keep_field, of a hybrid.
 };
 /// Model -> printed solid. Fills in everything of `report` but the mesh block.

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// slice: layers for a printer, straight from the volume; no mesh is made.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "exit_codes.h"
+#include "fibrolite/ops/hybridize.h"
+#include "fibrolite/ops/text.h"
+#include "fibrolite/solid_io.h"
+#include "job.h"
+#include "options.h"
+#include "slice_plates.h"
+
+namespace fibrolite::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SliceOptions {
+  ModelOptions model;
+  RecipeOptions recipe;
+  RunOptions run;
+  OutputOptions output;
+  std::optional<double> voxel_mm, layer_mm, pixel_mm;
+  std::optional<Printer> printer;
+  InfillKind infill = InfillKind::Hybrid;
+  bool tile = false;
+  int planes = 1;
+
+  [[nodiscard]] std::vector<fs::path> targets() const {
+    std::vector<fs::path> all = output.files;
+    all.push_back(output.report_path());
+    return all;
+  }
+  [[nodiscard]] bool from_solid() const { return model.path.extension() == ".vdb" || model.path.extension() == ".VDB"; }
+};
+
+/// What is cut into layers. Of a model it is only known how large it is until fill() has made it.
+struct Source {
+  Box3d box;            // in the frame of the print
+  double area_mm2 = 0;  // of its surfaces, roughly: what the size of a file depends on
+  double memory = 0;    // to make it, bytes
+  Shape shape;
+  double volume_mm3 = 0;
+};
+
+/// Layers lie across `up`.
+Frame print_frame(Up up) { return up == Up::Z ? Frame{} : frame_along({}, direction(up)); }
+
+Box3d bounds_in(const Frame& frame, const Mesh& mesh) {
+  Box3d box;
+  for (const Vec3f& v : mesh.vertices) box.include(frame.to_local(to_double(v)));
+  return box;
+}
+
+void check_options(const SliceOptions& options) {
+  if (options.printer && options.pixel_mm)
+    throw UsageError("--printer and --pixel together", "command line", "use one: a printer has its own pixels");
+  if (options.tile && !options.printer)
+    throw UsageError("--tile without a printer", "command line", "use it with --printer");
+  for (const fs::path& file : options.output.files) {
+    if (options.tile && slice_format(file) != SliceFormat::PngZip)
+      throw UsageError("--tile makes several plates, this file holds one", file.string(), "use .zip");
+  }
+  if (options.from_solid() && (options.model.prepare.size_mm || options.model.prepare.unit_mm))
+    throw UsageError("--size and --unit are of a model, this is a solid", options.model.path.string(),
+                     "scale the model when the solid is generated");
+}
+
+/// Layers and pixels that a format cannot hold are refused before anything is made.
+void check_plates(const SliceOptions& options, const std::vector<SlicePlate>& plates, double memory) {
+  double layers = 0;
+  for (const SlicePlate& plate : plates) layers += plate.grid.layers;
+  for (const fs::path& file : options.output.files) {
+    const int most = most_layers(slice_format(file));
+    if (layers > most) {
+      throw Error(Code::TooLarge,
+                  number_text(layers, 12) + " layers, more than the " + std::to_string(most) + " that the format holds",
+                  file.string(), "use a larger --layer");
+    }
+  }
+  const double needed = memory + slicing_memory(plates.front().grid);
+  if (needed > options.run.allowed_bytes()) {
+    throw Error(
+        Code::TooLarge,
+        "the run would need about " + memory_text(needed) + " of memory, more than " +
+            memory_text(options.run.allowed_bytes()),
+        std::to_string(plates.front().grid.width) + " x " + std::to_string(plates.front().grid.height) + " pixels",
+        "use a larger --pixel or --voxel, or raise --max-memory");
+  }
+}
+
+/// Bytes for each pixel that a surface runs through, measured on a horse full of crystal.
+double bytes_a_cut(SliceFormat format) {
+  switch (format) {
+    case SliceFormat::PngZip:
+    case SliceFormat::Sl1:
+      return 3.2;
+    case SliceFormat::SvgZip:
+      return 6;
+    case SliceFormat::Svg:
+      return 17;
+    case SliceFormat::Cli:
+      return 15;
+  }
+  return 0;
+}
+
+/// Within a factor of two or so of what is written.
+double expected_bytes(const fs::path& file, const std::vector<SlicePlate>& plates, double area_mm2) {
+  const SliceGrid& grid = plates.front().grid;
+  double layers = 0;
+  for (const SlicePlate& plate : plates) layers += plate.grid.layers;
+  const double pixel_mm = std::sqrt(grid.pixel_mm.x * grid.pixel_mm.y);
+  return 1000 * layers + bytes_a_cut(slice_format(file)) * area_mm2 / (grid.layer_mm * pixel_mm);
+}
+
+std::string plates_text(const std::vector<SlicePlate>& plates) {
+  const SliceGrid& grid = plates.front().grid;
+  long long layers = 0;
+  for (const SlicePlate& plate : plates) layers += plate.grid.layers;
+  std::string text = "layers    " + std::to_string(layers) + " of " + number_text(grid.layer_mm) + " mm";
+  if (plates.size() > 1) text += " on " + std::to_string(plates.size()) + " plates";
+  text += "\npixels    " + std::to_string(grid.width) + " x " + std::to_string(grid.height) + " of ";
+  return text + number_text(grid.pixel_mm.x, 5) + " x " + number_text(grid.pixel_mm.y, 5) + " mm\n";
+}
+
+std::string plan(const SliceOptions& options, const Source& source, const std::vector<SlicePlate>& plates) {
+  const Vec3d size = source.box.size();
+  std::string text = "model     " + options.model.path.string() + ", ";
+  text += number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) + " mm\n";
+  text += plates_text(plates) + "memory    at most ";
+  text += memory_text(source.memory + slicing_memory(plates.front().grid)) + " of ";
+  text += memory_text(options.run.allowed_bytes()) + "\n";
+  for (const fs::path& file : options.output.files)
+    text +=
+        "output    " + file.string() + ", about " + memory_text(expected_bytes(file, plates, source.area_mm2)) + "\n";
+  return text + "dry run: nothing was written\n";
+}
+
+std::string with_slices(const Report& report, const std::vector<SlicePlate>& plates,
+                        const std::vector<SlicedPlate>& done) {
+  using Json = nlohmann::ordered_json;
+  Json json = Json::parse(to_json(report)), list = Json::array();
+  double volume = 0;
+  for (std::size_t p = 0; p < plates.size(); ++p) {
+    const SliceGrid& grid = plates[p].grid;
+    list.push_back({{"name", plates[p].name},
+                    {"layers", grid.layers},
+                    {"layer_mm", grid.layer_mm},
+                    {"pixel_mm", {grid.pixel_mm.x, grid.pixel_mm.y}},
+                    {"size_px", {grid.width, grid.height}},
+                    {"volume_mm3", done[p].volume_mm3},
+                    {"area_mm2", done[p].area_mm2}});
+    volume += done[p].volume_mm3;
+  }
+  json["slices"] = {{"volume_mm3", volume}, {"plates", list}};
+  return json.dump(2) + "\n";
+}
+
+void print_result(const SliceOptions& options, const std::vector<SlicePlate>& plates, double volume_mm3,
+                  const Report& report) {
+  std::string text = plates_text(plates) + "volume    " + number_text(volume_mm3, 6) + " mm3 in the layers, ";
+  text += number_text(report.solid.volume_mm3, 6) + " mm3 of the solid\n";
+  double wall_s = 0, cpu_s = 0, peak_mb = 0;
+  for (const StageReport& stage : report.stages) {
+    wall_s += stage.wall_s;
+    cpu_s += stage.cpu_s;
+    peak_mb = std::max(peak_mb, stage.peak_rss_mb);
+  }
+  text += "run       " + number_text(wall_s, 3) + " s (" + number_text(cpu_s, 3) + " s of CPU), ";
+  text += number_text(peak_mb, 3) + " MB of memory\n";
+  for (const std::string& warning : report.warnings) text += "warning   " + warning + "\n";
+  for (const fs::path& file : options.targets()) text += "wrote     " + file.string() + "\n";
+  try {
+    print(text);
+  } catch (const Error&) {  // the outputs are in place: a failing stdout is let be
+  }
+}
+
+void slice_to_files(const SliceOptions& options) {
+  check_options(options);
+  HybridizeParams params;
+  params.recipe = options.recipe.load();
+  params.recipe.verify.up = direction(options.model.up);
+  params.infill = options.infill;
+  params.function = true;
+  Job job("slice", params.recipe, options.model, options.run, options.targets());
+  const Context& context = job.context();
+  Report& report = job.report;
+  Stopwatch stage(report.stages);
+
+  const Frame frame = print_frame(options.model.up);
+  Source source;
+  Model model;
+  if (options.from_solid()) {
+    report.model.path = options.model.path.string();
+    stage("read", [&] {
+      const Solid solid = read_vdb(options.model.path);
+      source.box = fibrolite::bounds_in(frame, solid);
+      source.shape = smooth_distance_to(solid);
+      source.volume_mm3 = solid.volume_mm3();
+      source.memory = static_cast<double>(solid.memory_bytes());
+      // A band of six voxels about the surface.
+      source.area_mm2 = static_cast<double>(solid.active_voxels()) * std::pow(solid.grid().voxel_mm, 2) / 6;
+      report.solid.active_voxels = solid.active_voxels();
+      report.solid.voxel_mm = solid.grid().voxel_mm;
+    });
+    if (source.box.empty()) throw Error(Code::BadInput, "the solid is empty", options.model.path.string());
+    report.model.size_mm = source.box.size();
+  } else {
+    check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
+    model = load_model(options.model, report, context.part(0, 0.05, "read"));
+    params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
+    check_recipe(params.recipe, *params.voxel_mm, options.infill);
+    check_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run);
+    source.box = bounds_in(frame, model.mesh);
+    source.memory = predict_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill);
+    const double thinnest = thinnest_mm(params.recipe, options.infill);
+    source.area_mm2 = 2 * area(model.mesh);
+    if (std::isfinite(thinnest)) source.area_mm2 += 0.16 * std::abs(signed_volume(model.mesh)) / thinnest;
+  }
+  const std::vector<SlicePlate> plates =
+      make_plates(frame, source.box,
+                  {options.layer_mm.value_or(0.05), options.pixel_mm.value_or(0.05), options.printer, options.tile});
+  check_plates(options, plates, source.memory);
+  if (options.run.dry_run) return print(plan(options, source, plates));
+
+  if (!options.from_solid()) {
+    report.infill = name_of(options.infill);
+    Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.4, "fill"));
+    model = {};
+    // The function stays; the solid, on which pieces were tied and everything was measured, goes.
+    source.shape = std::move(hybrid.printed);
+    source.volume_mm3 = report.solid.volume_mm3;
+  }
+  report.solid.volume_mm3 = source.volume_mm3;
+
+  const SliceJob work{source.shape, plates, options.planes, options.output.files.front().stem().string(),
+                      options.printer ? options.printer->screen : Screen{}};
+  std::vector<SlicedPlate> done;
+  stage("layers", [&] {
+    const auto files = static_cast<double>(options.output.files.size());
+    for (std::size_t i = 0; i < options.output.files.size(); ++i) {
+      const auto n = static_cast<double>(i);
+      const fs::path& file = options.output.files[i];
+      done = write_slices(job.outputs.place(file), slice_format(file), work,
+                          context.part(0.4 + 0.6 * n / files, 0.4 + 0.6 * (n + 1) / files, "layers"));
+    }
+  });
+  double volume_mm3 = 0;
+  for (const SlicedPlate& plate : done) volume_mm3 += plate.volume_mm3;
+  if (std::abs(volume_mm3 - source.volume_mm3) > 0.005 * source.volume_mm3) {
+    report.warnings.push_back("the layers add up to " + number_text(volume_mm3) + " mm3, the solid has " +
+                              number_text(source.volume_mm3) + " mm3: use thinner layers or smaller pixels or voxels");
+  }
+  job.finish(options.output.report_path(), with_slices(report, plates, done));
+  if (!options.run.quiet) print_result(options, plates, volume_mm3, report);
+}
+
+}  // namespace
+
+void add_slice_command(CLI::App& program) {
+  const auto options = std::make_shared<SliceOptions>();
+  CLI::App& command =
+      *program.add_subcommand("slice", "Layers for a printer, from a model or a solid (.vdb); no mesh is made");
+  add_options(command, options->model);
+  add_options(command, options->output, {".zip", ".sl1", ".svg", ".cli"});
+  add_length(command, "--layer", options->layer_mm, "Height of a layer (default 0.05)");
+  add_length(command, "--pixel", options->pixel_mm, "Edge of a pixel (default 0.05)");
+  command
+      .add_option_function<std::string>(
+          "--printer", [options](const std::string& text) { options->printer = parse_printer(text); },
+          "Size and pixels of a printer: sl1, sl1s, or e.g. 120.96x68.04x150:2560x1440")
+      ->type_name("WxDxH:PXxPY");
+  command.add_flag("--tile", options->tile, "Cut a part that is larger than the printer into several plates");
+  command
+      .add_option("--planes", options->planes,
+                  "Heights at which a layer is sampled: 1, 2, 4, 8 (default 1); more make flat slopes grey too")
+      ->check(CLI::IsMember({1, 2, 4, 8}));
+  add_infill(command, options->infill);
+  add_voxel(command, options->voxel_mm,
+            "Voxel edge of the body, and of the check that all is one piece (default: as for generate)");
+  add_options(command, options->recipe);
+  command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");
+  add_options(command, options->run);
+  command.callback([options] { slice_to_files(*options); });
+}
+
+}  // namespace fibrolite::cli
