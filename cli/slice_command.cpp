@@ -214,6 +214,7 @@ void slice_to_files(const SliceOptions& options) {
   } else {
     check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
     model = load_model(options.model, report, context.part(0, 0.05, "read"));
+    params.recipe.verify.loads = with_paint(std::move(params.recipe.verify.loads), model.painted);
     params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
     check_recipe(params.recipe, *params.voxel_mm, options.infill);
     check_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run);
