@@ -297,7 +297,7 @@ Recipe finished(Recipe recipe) {
 
 void apply(Recipe& recipe, const Json& object, const std::string& group, const std::string& source) {
   for (const auto& [name, value] : object.items()) {
-    const std::string key = group.empty() ? name : group + "." + name;
+    const std::string key = group.empty() ? name : std::string(group).append(".").append(name);
     if (const Field* row = find(key)) {
       row->put(recipe, value, source);
     } else if (!is_group(key)) {
