@@ -22,7 +22,7 @@ bool is_length(double mm) { return std::isfinite(mm) && mm > 0; }
 /// The part of a triangle that is inside, the surface a straight line through it.
 double inside_share(float a, float b, float c) {
   const int inside = (a < 0 ? 1 : 0) + (b < 0 ? 1 : 0) + (c < 0 ? 1 : 0);
-  if (inside == 0 || inside == 3) return inside / 3;
+  if (inside == 0 || inside == 3) return inside == 3 ? 1 : 0;
   const bool lone = inside == 1;  // the sign of the one corner that the line cuts off
   if ((b < 0) == lone && (a < 0) != lone && (c < 0) != lone) std::swap(a, b);
   if ((c < 0) == lone && (a < 0) != lone && (b < 0) != lone) std::swap(a, c);
