@@ -6,6 +6,8 @@
 #include <tbb/parallel_reduce.h>
 
 #include <Eigen/Dense>
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -40,6 +42,87 @@ double sum(std::size_t count, const Term& term) {
 
 /// The corners a node follows: itself and nothing, or the ends of its edge.
 using Ends = std::array<std::uint32_t, 2>;
+
+/// The vectors at the nodes that a column of components, three per node, stands for.
+std::vector<Vec3d> nodal_vectors(const Eigen::VectorXd& components) {
+  std::vector<Vec3d> vectors(static_cast<std::size_t>(components.size()) / 3);
+  each(vectors.size(), [&](std::size_t i) {
+    const double* c = components.data() + 3 * i;
+    vectors[i] = {c[0], c[1], c[2]};
+  });
+  return vectors;
+}
+
+using Product = std::function<Eigen::VectorXd(const Eigen::VectorXd&)>;
+
+/// What Eigen's conjugate gradients ask of a preconditioner.
+struct Preconditioner {
+  Product apply;
+  template <class Matrix>
+  void compute(const Matrix& /*known*/) {}
+  [[nodiscard]] static Eigen::ComputationInfo info() { return Eigen::Success; }
+  [[nodiscard]] Eigen::VectorXd solve(const Eigen::VectorXd& r) const { return apply(r); }
+};
+
+class Symmetric;
+
+}  // namespace
+}  // namespace fibrolite::fem
+
+template <>
+struct Eigen::internal::traits<fibrolite::fem::Symmetric> : Eigen::internal::traits<Eigen::SparseMatrix<double>> {};
+
+namespace fibrolite::fem {
+namespace {
+
+/// A matrix that is known by its products alone, as Eigen wants it (its page on matrix-free solvers).
+class Symmetric : public Eigen::EigenBase<Symmetric> {
+ public:
+  using Scalar = double;
+  using RealScalar = double;
+  using StorageIndex = int;
+  enum { ColsAtCompileTime = Eigen::Dynamic, MaxColsAtCompileTime = Eigen::Dynamic, IsRowMajor = false };
+
+  Symmetric(Eigen::Index size, Product product) : size_(size), product_(std::move(product)) {}
+  [[nodiscard]] Eigen::Index rows() const { return size_; }
+  [[nodiscard]] Eigen::Index cols() const { return size_; }
+  [[nodiscard]] Eigen::VectorXd times(const Eigen::VectorXd& v) const { return product_(v); }
+  template <class Vector>
+  Eigen::Product<Symmetric, Vector, Eigen::AliasFreeProduct> operator*(const Eigen::MatrixBase<Vector>& v) const {
+    return {*this, v.derived()};
+  }
+
+ private:
+  Eigen::Index size_;
+  Product product_;
+};
+
+}  // namespace
+}  // namespace fibrolite::fem
+
+template <class Vector>
+struct Eigen::internal::generic_product_impl<fibrolite::fem::Symmetric, Vector, Eigen::SparseShape, Eigen::DenseShape,
+                                             Eigen::GemvProduct>
+    : Eigen::internal::generic_product_impl_base<
+          fibrolite::fem::Symmetric, Vector, Eigen::internal::generic_product_impl<fibrolite::fem::Symmetric, Vector>> {
+  using Scalar = double;
+  template <class Result>
+  static void scaleAndAddTo(Result& result, const fibrolite::fem::Symmetric& matrix, const Vector& v,
+                            const Scalar& alpha) {
+    result += alpha * matrix.times(v);
+  }
+};
+
+namespace fibrolite::fem {
+namespace {
+
+[[noreturn]] void not_reached(int iterations) {
+  throw Error(Code::SolverFailed,
+              std::string("the iterative solver did not reach its residual in ")
+                  .append(std::to_string(iterations))
+                  .append(" iterations"),
+              "elasticity", "look for parts that hang by a point or an edge, or for a Poisson's ratio close to 0.5");
+}
 
 }  // namespace
 
@@ -163,6 +246,19 @@ struct TwoLevel::Nodes final : SmoothLevel {
       }
     });
   }
+
+  /// The preconditioner's answer to a residual.
+  Eigen::VectorXd answer(const Eigen::VectorXd& r) {
+    each(size(), [&](std::size_t k) {
+      b[k] = static_cast<float>(r[static_cast<Eigen::Index>(k)]);
+      x[k] = 0;
+    });
+    smoother.smooth(*this, b.data(), x.data(), y.data(), d.data(), true);
+    apply(x.data(), y.data());
+    correct();
+    smoother.smooth(*this, b.data(), x.data(), y.data(), d.data(), false);
+    return Eigen::Map<const Eigen::VectorXf>(x.data(), r.size()).cast<double>();
+  }
 };
 
 TwoLevel::TwoLevel(const System& system, const Context& context) : system_(system), nodes_(std::make_unique<Nodes>()) {
@@ -179,84 +275,52 @@ TwoLevel::TwoLevel(const System& system, const Context& context) : system_(syste
 
 TwoLevel::~TwoLevel() = default;
 
-void TwoLevel::precondition(const std::vector<Vec3d>& r, std::vector<Vec3d>& z) {
-  Nodes& n = *nodes_;
-  each(r.size(), [&](std::size_t i) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      n.b[3 * i + axis] = static_cast<float>(r[i][static_cast<int>(axis)]);
-      n.x[3 * i + axis] = 0;
-    }
-  });
-  n.smoother.smooth(n, n.b.data(), n.x.data(), n.y.data(), n.d.data(), true);
-  n.apply(n.x.data(), n.y.data());
-  n.correct();
-  n.smoother.smooth(n, n.b.data(), n.x.data(), n.y.data(), n.d.data(), false);
-  const auto value = [&](std::size_t k) { return static_cast<double>(n.x[k]); };
-  each(r.size(), [&](std::size_t i) { z[i] = {value(3 * i), value(3 * i + 1), value(3 * i + 2)}; });
-}
-
 int TwoLevel::solve(const std::vector<Vec3d>& force_n, std::vector<Vec3d>& displacement, const Goal& goal,
                     const Context& context) {
-  const std::size_t count = displacement.size();
-  const auto free_part = [&](std::size_t i, Vec3d v) {
-    return Vec3d{system_.free(i, 0) ? v.x : 0, system_.free(i, 1) ? v.y : 0, system_.free(i, 2) ? v.z : 0};
-  };
-  const auto inner_product = [&](const std::vector<Vec3d>& a, const std::vector<Vec3d>& b) {
-    return sum(count, [&](std::size_t i) { return dot(a[i], b[i]); });
-  };
-  std::vector<Vec3d> rest(count);  // of all components: where nothing is free, minus the reaction
-  const auto true_rest = [&] {
-    rest = internal_force(system_, displacement, context);
-    each(count, [&](std::size_t i) { rest[i] = (force_n.empty() ? Vec3d{} : force_n[i]) - rest[i]; });
-  };
-  const double loaded = force_n.empty() ? 0 : std::sqrt(inner_product(force_n, force_n));
-  double error = 0;
-  const auto reached = [&] {
-    const double all = inner_product(rest, rest);
-    const double wrong = sum(count, [&](std::size_t i) {
-      const Vec3d r = free_part(i, rest[i]);
-      return dot(r, r);
+  const auto free_part = [&](const std::vector<Vec3d>& v) {
+    Eigen::VectorXd kept(static_cast<Eigen::Index>(3 * v.size()));
+    each(v.size(), [&](std::size_t i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        kept[static_cast<Eigen::Index>(3 * i) + axis] =
+            system_.free(i, static_cast<std::size_t>(axis)) ? v[i][axis] : 0;
+      }
     });
-    error = std::sqrt(wrong);
-    return error <= goal.relative * (loaded + std::sqrt(std::max(0.0, all - wrong))) + goal.absolute_n;
+    return kept;
+  };
+  const auto squares = [&](const std::vector<Vec3d>& v) {
+    return sum(v.size(), [&](std::size_t i) { return dot(v[i], v[i]); });
+  };
+  const double loaded = std::sqrt(squares(force_n));
+  const Symmetric matrix(static_cast<Eigen::Index>(3 * displacement.size()), [&](const Eigen::VectorXd& p) {
+    context.check();
+    return free_part(internal_force(system_, nodal_vectors(p), context));
+  });
+  Eigen::ConjugateGradient<Symmetric, Eigen::Lower | Eigen::Upper, Preconditioner> gradients(matrix);
+  int iterations = 0;
+  double first = 0;
+  gradients.preconditioner().apply = [&](const Eigen::VectorXd& r) {
+    const double error = r.norm();
+    if (!std::isfinite(error)) not_reached(iterations);
+    context.progress(std::clamp(std::log(error / first) / std::log(goal.relative), 0.0, 1.0));
+    return nodes_->answer(r);
   };
 
-  std::vector<Vec3d> r(count), before(count), z(count), p(count);
-  const auto fresh = [&] { each(count, [&](std::size_t i) { r[i] = free_part(i, rest[i]); }); };
-  true_rest();
-  fresh();
-  double first = 0, rz = 0;
-  for (int iteration = 0;; ++iteration) {
-    if (reached()) {
-      true_rest();  // the running one has drifted
-      if (reached()) return iteration;
-      fresh();
-      rz = 0;
-    }
-    if (iteration == 0) first = error;
-    if (iteration == goal.max_iterations || !std::isfinite(error)) {
-      throw Error(Code::SolverFailed,
-                  "the iterative solver did not reach its residual in " + std::to_string(iteration) + " iterations",
-                  "elasticity",
-                  "look for parts that hang by a point or an edge, or for a Poisson's ratio close to 0.5");
-    }
-    context.check();
-    context.progress(std::clamp(std::log(error / first) / std::log(goal.relative), 0.0, 1.0));
-    precondition(r, z);
-    // Single precision makes the preconditioner a little different each time: this form of the next direction does not
-    // mind.
-    const double fresh_part = inner_product(z, r), stale = rz > 0 ? inner_product(z, before) : 0;
-    const double keep = rz > 0 ? (fresh_part - stale) / rz : 0;
-    rz = fresh_part;
-    each(count, [&](std::size_t i) { p[i] = z[i] + keep * p[i]; });
-    const std::vector<Vec3d> image = internal_force(system_, p, context);
-    const double step = rz / inner_product(p, image);
-    std::swap(before, r);
-    each(count, [&](std::size_t i) {
-      displacement[i] = displacement[i] + step * p[i];
-      rest[i] = rest[i] - step * image[i];
-      r[i] = free_part(i, rest[i]);
-    });
+  // What the library takes for its residual drifts from the true one: measure, and go on from there.
+  for (;;) {
+    std::vector<Vec3d> rest = internal_force(system_, displacement, context);  // where nothing is free: - the reaction
+    each(rest.size(), [&](std::size_t i) { rest[i] = (force_n.empty() ? Vec3d{} : force_n[i]) - rest[i]; });
+    const Eigen::VectorXd wrong = free_part(rest);
+    const double error = wrong.norm();
+    const double held = std::sqrt(std::max(0.0, squares(rest) - error * error));
+    const double wanted = goal.relative * (loaded + held) + goal.absolute_n;
+    if (error <= wanted) return iterations;
+    if (!std::isfinite(error) || iterations >= goal.max_iterations) not_reached(iterations);
+    if (iterations == 0) first = error;
+    gradients.setTolerance(0.7 * wanted / error);
+    gradients.setMaxIterations(goal.max_iterations - iterations);
+    const std::vector<Vec3d> step = nodal_vectors(gradients.solve(wrong));
+    iterations += std::max(1, static_cast<int>(gradients.iterations()));
+    each(displacement.size(), [&](std::size_t i) { displacement[i] = displacement[i] + step[i]; });
   }
 }
 

@@ -10,9 +10,9 @@
 
 namespace fibrolite::fem {
 
-/// The preconditioner: Chebyshev smoothing on all ten nodes, in single precision, around a solve by Cholesky of the
-/// same body with four-node tetrahedra, an eighth of the unknowns. These linear displacements contain the rigid motions
-/// of every piece exactly, so no mode that the smoother cannot see is lost.
+/// Eigen's conjugate gradients. The preconditioner: Chebyshev smoothing on all ten nodes, in single precision, around a
+/// solve by Cholesky of the same body with four-node tetrahedra, an eighth of the unknowns. These linear displacements
+/// contain the rigid motions of every piece exactly, so no mode that the smoother cannot see is lost.
 class TwoLevel {
  public:
   /// Cost: a Cholesky factor of the corners, and two assemblies. @throws Error SolverFailed: singular; TooLarge;
@@ -34,7 +34,6 @@ class TwoLevel {
 
  private:
   struct Nodes;
-  void precondition(const std::vector<Vec3d>& r, std::vector<Vec3d>& z);
   const System& system_;
   std::unique_ptr<Nodes> nodes_;
 };
