@@ -12,8 +12,8 @@ Job::Job(const std::string& command, const Recipe& recipe, const ModelOptions& m
   report.threads = ThreadLimit::count();
 }
 
-void Job::finish(const std::filesystem::path& report_path, const std::string& text) {
-  write_text(outputs.place(report_path), text);
+void Job::finish(const std::filesystem::path& report_path) {
+  write_text(outputs.place(report_path), to_json(report));
   context().check();
   outputs.commit();
   context().progress(1);

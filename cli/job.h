@@ -25,9 +25,7 @@ class Job {
   Outputs outputs;
   [[nodiscard]] const Context& context() const { return terminal_.context(); }
   /// Write the report and put every output in its place. @throws Error Io, Cancelled; then none of them is there.
-  void finish(const std::filesystem::path& report_path) { finish(report_path, to_json(report)); }
-  /// The same with a report that says more.
-  void finish(const std::filesystem::path& report_path, const std::string& text);
+  void finish(const std::filesystem::path& report_path);
 
  private:
   const ThreadLimit threads_;

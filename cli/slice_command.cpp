@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "commands.h"
 #include "exit_codes.h"
@@ -13,6 +13,7 @@
 #include "job.h"
 #include "options.h"
 #include "slice_plates.h"
+#include "summary.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -65,9 +66,15 @@ void check_options(const SliceOptions& options) {
     if (options.tile && slice_format(file) != SliceFormat::PngZip)
       throw UsageError("--tile makes several plates, this file holds one", file.string(), "use .zip");
   }
-  if (options.from_solid() && (options.model.prepare.size_mm || options.model.prepare.unit_mm))
-    throw UsageError("--size and --unit are of a model, this is a solid", options.model.path.string(),
-                     "scale the model when the solid is generated");
+}
+
+/// A solid is cut as it stands: what says how to make one of a model would be ignored without a word.
+void check_of_solid(const CLI::App& command, const fs::path& solid) {
+  for (const char* option : {"--size", "--unit", "--infill", "--voxel", "--preset", "--recipe", "--set", "--seed"}) {
+    if (command.count(option) == 0) continue;
+    throw UsageError(std::string(option) + " is for a model, this is a solid", solid.string(),
+                     "leave it out, or give it to generate, which makes the solid");
+  }
 }
 
 /// Layers and pixels that a format cannot hold are refused before anything is made.
@@ -118,67 +125,27 @@ double expected_bytes(const fs::path& file, const std::vector<SlicePlate>& plate
   return 1000 * layers + bytes_a_cut(slice_format(file)) * area_mm2 / (grid.layer_mm * pixel_mm);
 }
 
-std::string plates_text(const std::vector<SlicePlate>& plates) {
-  const SliceGrid& grid = plates.front().grid;
-  long long layers = 0;
-  for (const SlicePlate& plate : plates) layers += plate.grid.layers;
-  std::string text = "layers    " + std::to_string(layers) + " of " + number_text(grid.layer_mm) + " mm";
-  if (plates.size() > 1) text += " on " + std::to_string(plates.size()) + " plates";
-  text += "\npixels    " + std::to_string(grid.width) + " x " + std::to_string(grid.height) + " of ";
-  return text + number_text(grid.pixel_mm.x, 5) + " x " + number_text(grid.pixel_mm.y, 5) + " mm\n";
+/// What is known of the plates before they are sliced.
+std::vector<PlateReport> described(const std::vector<SlicePlate>& plates) {
+  std::vector<PlateReport> all;
+  for (const SlicePlate& plate : plates) {
+    const SliceGrid& grid = plate.grid;
+    all.push_back({plate.name, grid.layers, grid.layer_mm, grid.pixel_mm, grid.width, grid.height, 0, {}});
+  }
+  return all;
 }
 
 std::string plan(const SliceOptions& options, const Source& source, const std::vector<SlicePlate>& plates) {
   const Vec3d size = source.box.size();
   std::string text = "model     " + options.model.path.string() + ", ";
   text += number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) + " mm\n";
-  text += plates_text(plates) + "memory    at most ";
+  text += layers_text(described(plates)) + "memory    at most ";
   text += memory_text(source.memory + slicing_memory(plates.front().grid)) + " of ";
   text += memory_text(options.run.allowed_bytes()) + "\n";
   for (const fs::path& file : options.output.files)
     text +=
         "output    " + file.string() + ", about " + memory_text(expected_bytes(file, plates, source.area_mm2)) + "\n";
   return text + "dry run: nothing was written\n";
-}
-
-std::string with_slices(const Report& report, const std::vector<SlicePlate>& plates,
-                        const std::vector<SlicedPlate>& done) {
-  using Json = nlohmann::ordered_json;
-  Json json = Json::parse(to_json(report)), list = Json::array();
-  double volume = 0;
-  for (std::size_t p = 0; p < plates.size(); ++p) {
-    const SliceGrid& grid = plates[p].grid;
-    list.push_back({{"name", plates[p].name},
-                    {"layers", grid.layers},
-                    {"layer_mm", grid.layer_mm},
-                    {"pixel_mm", {grid.pixel_mm.x, grid.pixel_mm.y}},
-                    {"size_px", {grid.width, grid.height}},
-                    {"volume_mm3", done[p].volume_mm3},
-                    {"area_mm2", done[p].area_mm2}});
-    volume += done[p].volume_mm3;
-  }
-  json["slices"] = {{"volume_mm3", volume}, {"plates", list}};
-  return json.dump(2) + "\n";
-}
-
-void print_result(const SliceOptions& options, const std::vector<SlicePlate>& plates, double volume_mm3,
-                  const Report& report) {
-  std::string text = plates_text(plates) + "volume    " + number_text(volume_mm3, 6) + " mm3 in the layers, ";
-  text += number_text(report.solid.volume_mm3, 6) + " mm3 of the solid\n";
-  double wall_s = 0, cpu_s = 0, peak_mb = 0;
-  for (const StageReport& stage : report.stages) {
-    wall_s += stage.wall_s;
-    cpu_s += stage.cpu_s;
-    peak_mb = std::max(peak_mb, stage.peak_rss_mb);
-  }
-  text += "run       " + number_text(wall_s, 3) + " s (" + number_text(cpu_s, 3) + " s of CPU), ";
-  text += number_text(peak_mb, 3) + " MB of memory\n";
-  for (const std::string& warning : report.warnings) text += "warning   " + warning + "\n";
-  for (const fs::path& file : options.targets()) text += "wrote     " + file.string() + "\n";
-  try {
-    print(text);
-  } catch (const Error&) {  // the outputs are in place: a failing stdout is let be
-  }
 }
 
 void slice_to_files(const SliceOptions& options) {
@@ -252,14 +219,18 @@ void slice_to_files(const SliceOptions& options) {
                           context.part(0.4 + 0.6 * n / files, 0.4 + 0.6 * (n + 1) / files, "layers"));
     }
   });
-  double volume_mm3 = 0;
-  for (const SlicedPlate& plate : done) volume_mm3 += plate.volume_mm3;
+  report.slices = described(plates);
+  for (std::size_t p = 0; p < plates.size(); ++p) {
+    report.slices[p].volume_mm3 = done[p].volume_mm3;
+    report.slices[p].area_mm2 = std::move(done[p].area_mm2);
+  }
+  const double volume_mm3 = report.sliced_mm3();
   if (std::abs(volume_mm3 - source.volume_mm3) > 0.005 * source.volume_mm3) {
     report.warnings.push_back("the layers add up to " + number_text(volume_mm3) + " mm3, the solid has " +
                               number_text(source.volume_mm3) + " mm3: use thinner layers or smaller pixels or voxels");
   }
-  job.finish(options.output.report_path(), with_slices(report, plates, done));
-  if (!options.run.quiet) print_result(options, plates, volume_mm3, report);
+  job.finish(options.output.report_path());
+  if (!options.run.quiet) print_layers(report, options.targets());
 }
 
 }  // namespace
@@ -288,7 +259,10 @@ void add_slice_command(CLI::App& program) {
   add_options(command, options->recipe);
   command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");
   add_options(command, options->run);
-  command.callback([options] { slice_to_files(*options); });
+  command.callback([options, &command] {
+    if (options->from_solid()) check_of_solid(command, options->model.path);
+    slice_to_files(*options);
+  });
 }
 
 }  // namespace fibrolite::cli

@@ -72,6 +72,17 @@ std::string strength_table(const std::vector<StrengthReport>& cases) {
   return table(rows) + "\n" + table(weak) + "\n";
 }
 
+std::string run_line(const Report& report) {
+  double wall_s = 0, cpu_s = 0, peak_mb = 0;
+  for (const StageReport& stage : report.stages) {
+    wall_s += stage.wall_s;
+    cpu_s += stage.cpu_s;
+    peak_mb = std::max(peak_mb, stage.peak_rss_mb);
+  }
+  return "run       " + measured(wall_s, 3) + " s (" + measured(cpu_s, 3) + " s of CPU), " + measured(peak_mb, 3) +
+         " MB of memory\n";
+}
+
 /// Warnings and files, and out with it. The outputs are what was asked for, and they are in place: a failing stdout is
 /// let be.
 void finish(std::string text, const Report& report, const std::vector<std::filesystem::path>& files) {
@@ -99,15 +110,23 @@ void print_summary(const Report& report, const std::vector<std::filesystem::path
   text += "mesh      " + std::to_string(report.mesh.triangles) + " triangles, " +
           (report.mesh.closed() ? "closed" : std::to_string(report.mesh.boundary_edges) + " open edges") + "; voxel " +
           measured(solid.voxel_mm) + " mm\n";
-  double wall_s = 0, cpu_s = 0, peak_mb = 0;
-  for (const StageReport& stage : report.stages) {
-    wall_s += stage.wall_s;
-    cpu_s += stage.cpu_s;
-    peak_mb = std::max(peak_mb, stage.peak_rss_mb);
-  }
-  text += "run       " + measured(wall_s, 3) + " s (" + measured(cpu_s, 3) + " s of CPU), " + measured(peak_mb, 3) +
-          " MB of memory\n";
-  finish(text, report, files);
+  finish(text + run_line(report), report, files);
+}
+
+std::string layers_text(const std::vector<PlateReport>& plates) {
+  const PlateReport& first = plates.front();
+  std::int64_t layers = 0;
+  for (const PlateReport& plate : plates) layers += plate.layers;
+  std::string text = "layers    " + std::to_string(layers) + " of " + number_text(first.layer_mm) + " mm";
+  if (plates.size() > 1) text += " on " + std::to_string(plates.size()) + " plates";
+  text += "\npixels    " + std::to_string(first.width) + " x " + std::to_string(first.height) + " of ";
+  return text + number_text(first.pixel_mm.x, 5) + " x " + number_text(first.pixel_mm.y, 5) + " mm\n";
+}
+
+void print_layers(const Report& report, const std::vector<std::filesystem::path>& files) {
+  std::string text = layers_text(report.slices) + "volume    " + measured(report.sliced_mm3(), 6);
+  text += " mm3 in the layers, " + measured(report.solid.volume_mm3, 6) + " mm3 of the solid\n";
+  finish(text + run_line(report), report, files);
 }
 
 }  // namespace fibrolite::cli

@@ -14,5 +14,9 @@ namespace fibrolite::cli {
 void print_parts(const Report& report, const std::vector<std::filesystem::path>& files);
 /// Parts, solid, mesh, time, memory and files of a run whose outputs are in place; a failing standard output is let be.
 void print_summary(const Report& report, const std::vector<std::filesystem::path>& files);
+/// Layers, time, memory and files of a run that sliced.
+void print_layers(const Report& report, const std::vector<std::filesystem::path>& files);
+/// How many layers of how many pixels; one plate or more.
+[[nodiscard]] std::string layers_text(const std::vector<PlateReport>& plates);
 
 }  // namespace fibrolite::cli

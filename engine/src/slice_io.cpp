@@ -200,7 +200,7 @@ double total_area(const std::vector<Contour>& outlines) {
 std::string svg_path(const std::vector<Contour>& outlines, const SliceGrid& grid) {
   std::string text = "<path fill-rule=\"evenodd\" d=\"";
   const double top = grid.height * grid.pixel_mm.y;  // y points down in an SVG
-  const auto append = [&](double mm) {               // to 0.1 um
+  const auto append = [&](double mm) {               // to 0.1 um; never negative, outlines end at the rim
     append_integer(text, std::llround(mm * 1e4) / 10000);
     const long long rest = std::llround(mm * 1e4) % 10000;
     if (rest != 0) text.append(".").append(padded(static_cast<int>(rest), 4));

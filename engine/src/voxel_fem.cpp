@@ -21,9 +21,10 @@ struct VoxelFemResult::Impl {
   double young_mpa = 0, poisson = 0;
   std::vector<double> u;  ///< mm, three per node.
 
-  /// The cell with material around a point: its block, the place of its lowest corner, and where in it the point is.
+  /// The cell with material around a point: its block's nodes, the place of its lowest corner among them, and where in
+  /// the cell the point is.
   struct Found {
-    std::size_t block;
+    std::array<std::uint32_t, 729> table;
     int low;
     std::array<double, 3> s;
   };
@@ -41,7 +42,7 @@ struct VoxelFemResult::Impl {
     if (block == VoxelModel::none) return {};
     const int c = 64 * (cell[0] & 7) + 8 * (cell[1] & 7) + (cell[2] & 7);
     if (!(model.fraction[std::size_t{512} * block + static_cast<std::size_t>(c)] > 0)) return {};
-    found.block = block;
+    model.node_table(block, found.table.data());
     found.low = VoxelModel::lowest_corner(c);
     return found;
   }
@@ -50,13 +51,11 @@ struct VoxelFemResult::Impl {
 std::optional<Vec3d> VoxelFemResult::displacement_mm(Vec3d p) const {
   const auto found = impl_->find(p);
   if (!found) return {};
-  std::array<std::uint32_t, 729> table;
-  impl_->model.node_table(found->block, table.data());
   Vec3d sum{};
   for (unsigned a = 0; a < 8; ++a) {
     double shape = 1;
     for (unsigned k = 0; k < 3; ++k) shape *= ((a >> (2 - k)) & 1U) != 0 ? found->s[k] : 1 - found->s[k];
-    const std::size_t i = std::size_t{3} * table[static_cast<std::size_t>(found->low + VoxelModel::corner[a])];
+    const std::size_t i = std::size_t{3} * found->table[static_cast<std::size_t>(found->low + VoxelModel::corner[a])];
     sum = sum + shape * Vec3d{impl_->u[i], impl_->u[i + 1], impl_->u[i + 2]};
   }
   return sum;
@@ -65,10 +64,8 @@ std::optional<Vec3d> VoxelFemResult::displacement_mm(Vec3d p) const {
 std::optional<double> VoxelFemResult::von_mises_mpa(Vec3d p) const {
   const auto found = impl_->find(p);
   if (!found) return {};
-  std::array<std::uint32_t, 729> table;
-  impl_->model.node_table(found->block, table.data());
-  return von_mises(
-      cell_stress(impl_->model, impl_->element, impl_->young_mpa, impl_->poisson, impl_->u, table.data(), found->low));
+  return von_mises(cell_stress(impl_->model, impl_->element, impl_->young_mpa, impl_->poisson, impl_->u,
+                               found->table.data(), found->low));
 }
 
 namespace {

@@ -128,8 +128,16 @@ namespace {
 
 constexpr std::array<std::size_t, 3> step{64, 8, 1};
 
-/// visit(face centre, exposed area / edge^2, its four nodes, axis and sign of its normal, cell) for faces of the
-/// block's cells towards less material.
+/// A face of a cell towards less material.
+struct ExposedFace {
+  double area = 0;  ///< In squares of the edge: the difference of the two fractions.
+  std::array<std::uint32_t, 4> nodes{};
+  std::size_t axis = 0;
+  double sign = 1;       ///< Of its normal along the axis.
+  std::size_t cell = 0;  ///< In its block.
+};
+
+/// visit(its centre, ExposedFace) for each of a block.
 template <class Visit>
 void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32_t* table, const Visit& visit) {
   const float* fraction = model.fraction.data() + 512 * b;
@@ -144,11 +152,11 @@ void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32
       const auto face = [&](bool high, float exposed) {
         if (!(exposed > 1e-6F)) return;
         const int low = VoxelModel::lowest_corner(static_cast<int>(c));
-        std::array<std::uint32_t, 4> nodes;
+        ExposedFace out{.area = static_cast<double>(exposed), .axis = axis, .sign = high ? 1.0 : -1.0, .cell = c};
         std::size_t n = 0;
         for (std::size_t a = 0; a < 8; ++a) {
           if ((((a >> (2 - axis)) & 1U) != 0) == high) {
-            nodes[n++] = table[static_cast<std::size_t>(low + VoxelModel::corner[a])];
+            out.nodes[n++] = table[static_cast<std::size_t>(low + VoxelModel::corner[a])];
           }
         }
         const Vec3i cell{o.x + static_cast<int>(c >> 6), o.y + static_cast<int>((c >> 3) & 7U),
@@ -156,7 +164,7 @@ void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32
         Vec3d centre = model.centre_mm(cell);
         const double half = (high ? 0.5 : -0.5) * model.edge_mm;
         (axis == 0 ? centre.x : axis == 1 ? centre.y : centre.z) += half;
-        visit(centre, static_cast<double>(exposed), nodes, static_cast<int>(axis), high ? 1.0 : -1.0, c);
+        visit(centre, out);
       };
       const float here = fraction[c];
       if (!(here > 0)) continue;
@@ -173,39 +181,48 @@ void each_exposed_face(const VoxelModel& model, std::size_t b, const std::uint32
   }
 }
 
-void add_surface_force(const VoxelModel& model, const VoxelForce& force, std::size_t number, std::vector<double>& out) {
-  std::vector<std::pair<std::uint32_t, double>> weights;
+/// visit(faces) once per block that reaches into `where`: the exposed faces with their centre in it, each area times
+/// weight(face) and only if that is above 0.
+template <class Weight, class Visit>
+void each_block_of_faces(const VoxelModel& model, const Shape& where, const Weight& weight, const Visit& visit) {
   std::vector<std::uint32_t> table(729);
   std::vector<Vec3d> centre;
-  std::vector<double> area;
-  std::vector<std::array<std::uint32_t, 4>> nodes;
+  std::vector<ExposedFace> faces;
   std::vector<float> distance;
-  double total = 0;
   for (std::size_t b = 0; b < model.blocks(); ++b) {
-    if (force.where.bound(node_box(model, b)).lo > 0) continue;
+    if (where.bound(node_box(model, b)).lo > 0) continue;
     model.node_table(b, table.data());
     centre.clear();
-    area.clear();
-    nodes.clear();
-    each_exposed_face(
-        model, b, table.data(),
-        [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n, int axis, double sign, std::size_t) {
-          if (norm(force.facing) > 0) {
-            exposed *= sign * force.facing[axis];
-            if (!(exposed > 1e-9)) return;
-          }
-          centre.push_back(p);
-          area.push_back(exposed);
-          nodes.push_back(n);
-        });
+    faces.clear();
+    each_exposed_face(model, b, table.data(), [&](Vec3d at, ExposedFace face) {
+      face.area *= weight(face);
+      if (!(face.area > 1e-9)) return;
+      centre.push_back(at);
+      faces.push_back(face);
+    });
     distance.resize(centre.size());
-    force.where.evaluate(centre, distance);
-    for (std::size_t k = 0; k < centre.size(); ++k) {
-      if (!(distance[k] < 0)) continue;
-      total += area[k];
-      for (const std::uint32_t i : nodes[k]) weights.emplace_back(i, 0.25 * area[k]);
+    where.evaluate(centre, distance);
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < faces.size(); ++k) {
+      if (distance[k] < 0) faces[kept++] = faces[k];
     }
+    faces.resize(kept);
+    visit(faces);
   }
+}
+
+void add_surface_force(const VoxelModel& model, const VoxelForce& force, std::size_t number, std::vector<double>& out) {
+  std::vector<std::pair<std::uint32_t, double>> weights;
+  double total = 0;
+  const auto facing = [&](const ExposedFace& face) {
+    return norm(force.facing) > 0 ? face.sign * force.facing[static_cast<int>(face.axis)] : 1;
+  };
+  each_block_of_faces(model, force.where, facing, [&](const std::vector<ExposedFace>& faces) {
+    for (const ExposedFace& face : faces) {
+      total += face.area;
+      for (const std::uint32_t i : face.nodes) weights.emplace_back(i, 0.25 * face.area);
+    }
+  });
   if (!(total > 0)) {
     throw Error(Code::BadRecipe, "load " + std::to_string(number + 1) + " meets no material", "forces",
                 "let it reach over the surface");
@@ -220,39 +237,19 @@ void add_surface_force(const VoxelModel& model, const VoxelForce& force, std::si
 /// Returns the magnitude: the faces of one cell are the steps of one plane, so their forces add up as vectors.
 double add_pressure(const VoxelModel& model, const VoxelPressure& pressure, std::size_t number,
                     std::vector<double>& out) {
-  const double force_n = 0.25 * pressure.mpa * model.edge_mm * model.edge_mm;  // on each node of a face
-  std::vector<std::uint32_t> table(729);
-  struct Face {
-    double force_n;
-    std::array<std::uint32_t, 4> nodes;
-    std::size_t axis, cell;
-  };
-  std::vector<Face> faces;
-  std::vector<Vec3d> centre;
-  std::vector<float> distance;
+  const double on_node_n = 0.25 * pressure.mpa * model.edge_mm * model.edge_mm;  // of a whole face
   double magnitude_n = 0;
-  for (std::size_t b = 0; b < model.blocks(); ++b) {
-    if (pressure.where.bound(node_box(model, b)).lo > 0) continue;
-    model.node_table(b, table.data());
-    faces.clear();
-    centre.clear();
-    each_exposed_face(
-        model, b, table.data(),
-        [&](Vec3d p, double exposed, const std::array<std::uint32_t, 4>& n, int axis, double sign, std::size_t c) {
-          centre.push_back(p);
-          faces.push_back({-sign * exposed * force_n, n, static_cast<std::size_t>(axis), c});
-        });
+  const auto all = [](const ExposedFace&) { return 1.0; };
+  each_block_of_faces(model, pressure.where, all, [&](const std::vector<ExposedFace>& faces) {
     std::array<Vec3d, 512> of_cell{};
-    distance.resize(centre.size());
-    pressure.where.evaluate(centre, distance);
-    for (std::size_t k = 0; k < faces.size(); ++k) {
-      if (!(distance[k] < 0)) continue;
-      Vec3d& sum = of_cell[faces[k].cell];
-      (faces[k].axis == 0 ? sum.x : faces[k].axis == 1 ? sum.y : sum.z) += 4 * faces[k].force_n;
-      for (const std::uint32_t i : faces[k].nodes) out[std::size_t{3} * i + faces[k].axis] += faces[k].force_n;
+    for (const ExposedFace& face : faces) {
+      const double force_n = -face.sign * face.area * on_node_n;
+      Vec3d& sum = of_cell[face.cell];
+      (face.axis == 0 ? sum.x : face.axis == 1 ? sum.y : sum.z) += 4 * force_n;
+      for (const std::uint32_t i : face.nodes) out[std::size_t{3} * i + face.axis] += force_n;
     }
     for (const Vec3d v : of_cell) magnitude_n += norm(v);
-  }
+  });
   if (!(magnitude_n > 0)) {
     throw Error(Code::BadRecipe, "pressure " + std::to_string(number + 1) + " meets no material", "pressures",
                 "let it reach over the surface");

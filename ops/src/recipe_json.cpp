@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One table of keys drives reading, printing, --set, range checks and help.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <utility>
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/recipe.h"
@@ -89,38 +89,34 @@ void read(const Json& json, std::optional<std::filesystem::path>& value, Range, 
   }
 }
 
-std::string accepts(const Walls&, Range) { return "\"image\" or \"delaunay\""; }
-Json write(Walls value) { return value == Walls::Image ? "image" : "delaunay"; }
-void read(const Json& json, Walls& value, Range, const Place& place) {
-  if (json != "image" && json != "delaunay") place.refuse(json);
-  value = json == "image" ? Walls::Image : Walls::Delaunay;
-}
+// The words of an enumeration, in the order of its enumerators.
+constexpr std::array<const char*, 2> words(Walls) { return {"image", "delaunay"}; }
+constexpr std::array<const char*, 2> words(Bridge) { return {"mst", "bbox"}; }
+constexpr std::array<const char*, 3> words(TcsForm) { return {"sticks", "network", "sheet"}; }
+constexpr std::array<const char*, 2> words(TcsGrade) { return {"none", "surface"}; }
 
-std::string accepts(const Bridge&, Range) { return "\"mst\" or \"bbox\""; }
-Json write(Bridge value) { return value == Bridge::Mst ? "mst" : "bbox"; }
-void read(const Json& json, Bridge& value, Range, const Place& place) {
-  if (json != "mst" && json != "bbox") place.refuse(json);
-  value = json == "mst" ? Bridge::Mst : Bridge::Bbox;
+template <class Enum>
+concept Worded = requires(Enum value) {
+  words(value);
+};
+template <Worded Enum>
+std::string accepts(const Enum& value, Range) {
+  const auto all = words(value);
+  std::string text;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    text.append(i == 0 ? "\"" : i + 1 == all.size() ? "\" or \"" : "\", \"").append(all[i]);
+  return text.append("\"");
 }
-
-constexpr std::array<std::pair<TcsForm, const char*>, 3> forms{
-    {{TcsForm::Sticks, "sticks"}, {TcsForm::Network, "network"}, {TcsForm::Sheet, "sheet"}}};
-std::string accepts(const TcsForm&, Range) { return "\"sticks\", \"network\" or \"sheet\""; }
-Json write(TcsForm value) { return forms[static_cast<std::size_t>(value)].second; }
-void read(const Json& json, TcsForm& value, Range, const Place& place) {
-  for (const auto& [form, name] : forms)
-    if (json == name) {
-      value = form;
-      return;
-    }
-  place.refuse(json);
+template <Worded Enum>
+Json write(Enum value) {
+  return words(value)[static_cast<std::size_t>(value)];
 }
-
-std::string accepts(const TcsGrade&, Range) { return "\"none\" or \"surface\""; }
-Json write(TcsGrade value) { return value == TcsGrade::None ? "none" : "surface"; }
-void read(const Json& json, TcsGrade& value, Range, const Place& place) {
-  if (json != "none" && json != "surface") place.refuse(json);
-  value = json == "none" ? TcsGrade::None : TcsGrade::Surface;
+template <Worded Enum>
+void read(const Json& json, Enum& value, Range, const Place& place) {
+  const auto all = words(value);
+  const auto word = std::find(all.begin(), all.end(), json);
+  if (word == all.end()) place.refuse(json);
+  value = static_cast<Enum>(word - all.begin());
 }
 
 std::string accepts(const CellEdges&, Range range) { return range.words() + ", or three of them, [x, y, z]"; }

@@ -14,6 +14,8 @@ namespace {
 using Json = nlohmann::ordered_json;  // prints NaN and infinity as null
 
 Json list(Vec3d v) { return {v.x, v.y, v.z}; }
+template <class Item>
+Json array(const std::vector<Item>& items);  // below all the to_json that it calls
 
 Json to_json(const ModelReport& model) {
   return {{"path", model.path},
@@ -36,12 +38,10 @@ Json to_json(const CaseStress& c) {
 }
 
 Json to_json(const PartReport& part) {
-  Json cases = Json::array();
-  for (const CaseStress& c : part.stress.cases) cases.push_back(to_json(c));
   const Json stress = {{"axial", part.stress.axial},
                        {"transverse", {part.stress.transverse[0], part.stress.transverse[1]}},
                        {"von_mises", part.stress.von_mises},
-                       {"load_cases", cases}};
+                       {"load_cases", array(part.stress.cases)}};
   return {{"id", part.id},
           {"kind", part.kind},
           {"infill", part.infill},
@@ -115,8 +115,6 @@ Json to_json(const PlaceReport& place) {
 }
 
 Json to_json(const StrengthReport& s) {
-  Json places = Json::array();
-  for (const PlaceReport& place : s.places) places.push_back(to_json(place));
   return {{"load_case", s.load_case},
           {"load_n", s.load_n},
           {"compliance_nmm", s.compliance_n_mm},
@@ -127,11 +125,21 @@ Json to_json(const StrengthReport& s) {
           {"safety_factor", s.safety_factor},
           {"weakest_mm", list(s.weakest_mm)},
           {"weakest", s.weakest},
-          {"places", places},
+          {"places", array(s.places)},
           {"cells", s.cells},
           {"cell_mm", s.cell_mm},
           {"iterations", s.iterations},
           {"residual", s.residual}};
+}
+
+Json to_json(const PlateReport& plate) {
+  return {{"name", plate.name},
+          {"layers", plate.layers},
+          {"layer_mm", plate.layer_mm},
+          {"pixel_mm", {plate.pixel_mm.x, plate.pixel_mm.y}},
+          {"size_px", {plate.width, plate.height}},
+          {"volume_mm3", plate.volume_mm3},
+          {"area_mm2", plate.area_mm2}};
 }
 
 Json to_json(const StageReport& stage) {
@@ -175,10 +183,16 @@ double peak_rss_mb() {
 
 }  // namespace
 
+double Report::sliced_mm3() const {
+  double volume = 0;
+  for (const PlateReport& plate : slices) volume += plate.volume_mm3;
+  return volume;
+}
+
 std::string version() { return FIBROLITE_VERSION; }
 
 std::string to_json(const Report& report) {
-  const Json json = {
+  Json json = {
       {"schema", 1},
       {"version", version()},
       {"command", report.command},
@@ -202,6 +216,9 @@ std::string to_json(const Report& report) {
       {"threads", report.threads},
       {"stages", array(report.stages)},
       {"warnings", report.warnings}};
+  if (!report.slices.empty()) {
+    json["slices"] = {{"volume_mm3", report.sliced_mm3()}, {"plates", array(report.slices)}};
+  }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";  // a path need not be UTF-8
 }
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "fibrolite/mesh_io.h"
-#include "run_program.h"
+#include "fibrolite_program.h"
 
 namespace fibrolite {
 namespace {
@@ -38,15 +38,8 @@ class BadInput : public ::testing::Test {
     return path;
   }
 
-  /// Runs and expects: this exit code, one line of error, nothing written. Returns the line.
   std::string refused(const std::vector<std::string>& arguments, int code) {
-    const Finished run = run_program(FIBROLITE_PROGRAM, arguments);
-    EXPECT_EQ(run.code, code) << run.err;
-    EXPECT_THAT(run.err, StartsWith("fibrolite: error: "));
-    EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
-    EXPECT_EQ(run.out, "");
-    EXPECT_THAT(names_in(outputs.path()), IsEmpty());
-    return run.err;
+    return refused_run(arguments, code, outputs.path());
   }
   std::string refused_model(const fs::path& path) {
     return refused({"generate", path, "-o", outputs / "out.stl", "--voxel", "0.4"}, BadModel);

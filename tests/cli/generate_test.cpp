@@ -10,8 +10,8 @@
 
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/solid_io.h"
+#include "fibrolite_program.h"
 #include "mesh_checks.h"
-#include "run_program.h"
 
 namespace fibrolite {
 namespace {
@@ -34,12 +34,6 @@ std::vector<std::string> generate(const fs::path& model, const std::vector<std::
   arguments.insert(arguments.end(), more.begin(), more.end());
   return arguments;
 }
-Finished run(const std::vector<std::string>& arguments) {
-  Finished finished = run_program(FIBROLITE_PROGRAM, arguments);
-  EXPECT_EQ(finished.code, 0) << finished.err;
-  return finished;
-}
-json report_in(const fs::path& file) { return json::parse(content(file)); }
 
 void expect_sound(const fs::path& file, double volume_mm3) {
   const IndependentCount counted = count(read_mesh(file).mesh);

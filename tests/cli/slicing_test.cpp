@@ -12,7 +12,7 @@
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/solid_io.h"
-#include "run_program.h"
+#include "fibrolite_program.h"
 
 namespace fibrolite {
 namespace {
@@ -23,17 +23,9 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-using ::testing::StartsWith;
 namespace fs = std::filesystem;
 
 constexpr double pi = std::numbers::pi;
-
-Finished run(const std::vector<std::string>& arguments) {
-  Finished finished = run_program(FIBROLITE_PROGRAM, arguments);
-  EXPECT_EQ(finished.code, 0) << finished.err;
-  return finished;
-}
-json report_in(const fs::path& file) { return json::parse(content(file)); }
 
 double sum(const json& list) {
   double all = 0;
@@ -133,13 +125,7 @@ class SlicingRefused : public ::testing::Test {
     std::vector<std::string> arguments{"slice",    good_model(), "-o",      outputs / output,
                                        "--infill", "solid",      "--voxel", "0.5"};
     arguments.insert(arguments.end(), options.begin(), options.end());
-    const Finished finished = run_program(FIBROLITE_PROGRAM, arguments);
-    EXPECT_EQ(finished.code, code) << finished.err;
-    EXPECT_THAT(finished.err, StartsWith("fibrolite: error: "));
-    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
-    EXPECT_EQ(finished.out, "");
-    EXPECT_THAT(names_in(outputs.path()), IsEmpty());
-    return finished.err;
+    return refused_run(arguments, code, outputs.path());
   }
 };
 
@@ -172,15 +158,19 @@ TEST_F(SlicingRefused, FilesAndModels) {
   refused({}, Usage, "out.png");
   refused({}, NoOutput, "nowhere/out.zip");
   write_vdb(models / "ball.vdb", {{"solid", realize(sphere({}, 5), {{-9, -9, -9}, {9, 9, 9}}, {.voxel_mm = 0.5})}});
-  const auto solid = [&](const std::vector<std::string>& more) {
+  const auto solid = [&](const std::vector<std::string>& more, int code) {
     std::vector<std::string> arguments{"slice", models / "ball.vdb", "-o", outputs / "out.zip"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    return run_program(FIBROLITE_PROGRAM, arguments).code;
+    return refused_run(arguments, code, outputs.path());
   };
-  EXPECT_EQ(solid({"--size", "20"}), Usage);
+  // What only makes sense for a model is not ignored without a word.
+  const std::vector<std::pair<std::string, std::string>> of_a_model{
+      {"--size", "20"},        {"--unit", "cm"},       {"--infill", "tcs"}, {"--voxel", "0.5"},
+      {"--preset", "default"}, {"--recipe", "a.json"}, {"--seed", "2"},     {"--set", "tcs.cell_mm=5"}};
+  for (const auto& [option, value] : of_a_model)
+    EXPECT_THAT(solid({option, value}, Usage), HasSubstr(option + " is for a model"));
   fs::resize_file(models / "ball.vdb", 1000);
-  EXPECT_EQ(solid({}), BadModel);
-  EXPECT_THAT(names_in(outputs.path()), IsEmpty());
+  solid({}, BadModel);
 }
 TEST_F(SlicingRefused, AFullDiskMidRun) {
   // No file may grow beyond 64 KiB: the archive is refused half-way, as on a full disk.
@@ -189,9 +179,7 @@ TEST_F(SlicingRefused, AFullDiskMidRun) {
                                 good_model().string() + "' -o '" + (outputs / name).string() +
                                 "' --infill solid --voxel 0.5 --layer 0.02 --pixel 0.05";
     const Finished finished = run_program("/bin/bash", {"-c", command});
-    EXPECT_EQ(finished.code, NoOutput) << finished.err;
-    EXPECT_THAT(finished.err, StartsWith("fibrolite: error: "));
-    EXPECT_EQ(std::count(finished.err.begin(), finished.err.end(), '\n'), 1) << finished.err;
+    expect_refused(finished, NoOutput);
     EXPECT_THAT(names_in(outputs.path()), IsEmpty());
   }
 }

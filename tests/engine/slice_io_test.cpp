@@ -177,6 +177,33 @@ TEST(SliceIo, SvgsHaveMillimetresAndEvenOddHoles) {
   EXPECT_EQ(std::count(layer.begin(), layer.end(), 'Z'), 4);
 }
 
+TEST(SliceIo, AnSvgsOutlinesEndAtTheRimOfItsPicture) {
+  // A block that reaches over the left and the upper rim, both at 0 in the picture.
+  const TempDir folder;
+  SliceJob cut = job();
+  cut.shape = cuboid({{-9, 0, 0}, {0, 9, 4}});
+  const auto done = write(folder / "a.svg", cut);
+  std::string text = content(folder / "a.svg");
+  text = text.substr(text.find(" d=\"M") + 5);
+  text = text.substr(0, text.find('Z'));
+  std::replace(text.begin(), text.end(), 'L', ' ');
+  std::istringstream in(text.substr(1));
+  std::vector<Vec2d> points;
+  for (Vec2d p; in >> p.x >> p.y;) points.push_back(p);
+  ASSERT_TRUE(in.eof()) << text;
+  double least = 1, most = 0, twice = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec2d p = points[i], q = points[(i + 1) % points.size()];
+    least = std::min({least, p.x, p.y});
+    most = std::max({most, p.x, p.y});
+    twice += p.x * q.y - p.y * q.x;
+  }
+  EXPECT_EQ(least, 0);
+  EXPECT_NEAR(most, 6, 1e-3);
+  EXPECT_NEAR(std::abs(twice) / 2, 36, 0.02);  // a corner of the rim is cut
+  EXPECT_NEAR(done[0].area_mm2[0], 36, 0.02);
+}
+
 TEST(SliceIo, SameBytesOnOneAndTwoThreads) {
   const TempDir folder;
   for (const std::string ending : {".zip", ".sl1", ".svg", ".svg.zip", ".cli"}) {

@@ -67,6 +67,20 @@ Vec3d mean_displacement(const TetMesh& mesh, const Solution& s, const std::funct
   return sum / count;
 }
 
+/// A block held at its lowest face across `axis`, with one traction (N/mm2) on the highest.
+struct Clamped {
+  TetMesh mesh;
+  std::vector<Fixed> fixed;
+  LoadCase load;
+};
+Clamped clamped(TetMesh mesh, int axis, double highest, Vec3d traction) {
+  Clamped out{std::move(mesh), {}, {}};
+  fix(out.fixed, out.mesh, {0, 1, 2}, [=](Vec3d p) { return p[axis] == 0; });
+  out.load.force_n = load_faces(
+      out.mesh, [=](Vec3d p) { return p[axis] == highest; }, [=](Vec3d, Vec3d) { return traction; });
+  return out;
+}
+
 constexpr Material steel_like{.young_mpa = 200000, .poisson = 0.3};
 
 TEST(Elasticity, PatchTest) {
@@ -131,12 +145,9 @@ TEST(Elasticity, BarInTensionIsExact) {
 
 TEST(Elasticity, CantileverBendsAsTimoshenkoSays) {
   const double length = 100, width = 8, height = 10, force = 500;
-  const TetMesh mesh = block(20, 2, 2, {length, width, height});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.x == 0; });
-  LoadCase load;
+  const auto [mesh, fixed, load] =
+      clamped(block(20, 2, 2, {length, width, height}), 0, length, {0, 0, -force / (width * height)});
   const auto tip = [&](Vec3d p) { return p.x == length; };
-  load.force_n = load_faces(mesh, tip, [&](Vec3d, Vec3d) { return Vec3d{0, 0, -force / (width * height)}; });
   const Solution s = solve(mesh, steel_like, fixed, {load}).front();
   const double inertia = width * height * height * height / 12, shear_modulus = 200000 / 2.6;
   const double deflection = force * length * length * length / (3 * 200000 * inertia) +
@@ -244,15 +255,8 @@ TEST(Elasticity, ConvergesWithTheThirdPowerOfTheSize) {
 }
 
 TEST(Elasticity, ManyLoadsWithOneFactorisation) {
-  const TetMesh mesh = block(3, 2, 4, {6, 4, 9});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
-  LoadCase push, settle;
-  push.force_n = load_faces(
-      mesh, [](Vec3d p) { return p.z == 9; },
-      [](Vec3d, Vec3d) {
-        return Vec3d{3, 1, -2};
-      });
+  const auto [mesh, fixed, push] = clamped(block(3, 2, 4, {6, 4, 9}), 2, 9, {3, 1, -2});
+  LoadCase settle;
   settle.fixed_mm.assign(fixed.size(), 0);
   for (std::size_t k = 0; k < fixed.size(); ++k) settle.fixed_mm[k] = fixed[k].axis == 2 ? 0.25 : 0;
   const auto both = solve(mesh, steel_like, fixed, {push, settle});
@@ -266,15 +270,7 @@ TEST(Elasticity, ManyLoadsWithOneFactorisation) {
 }
 
 TEST(Elasticity, SameBitsOnOneAndTwoThreads) {
-  const TetMesh mesh = block(6, 6, 6, {10, 11, 12});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
-  LoadCase load;
-  load.force_n = load_faces(
-      mesh, [](Vec3d p) { return p.z == 12; },
-      [](Vec3d, Vec3d) {
-        return Vec3d{3, 1, -2};
-      });
+  const auto [mesh, fixed, load] = clamped(block(6, 6, 6, {10, 11, 12}), 2, 12, {3, 1, -2});
   const auto run = [&](std::size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return solve(mesh, steel_like, fixed, {load}).front();
@@ -299,12 +295,9 @@ void expect_same(const Solution& a, const Solution& b, double relative) {
 
 TEST(IterativeElasticity, CantileverBendsAsTimoshenkoSays) {
   const double length = 100, width = 8, height = 10, force = 500;
-  const TetMesh mesh = block(24, 4, 4, {length, width, height});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.x == 0; });
-  LoadCase load;
+  const auto [mesh, fixed, load] =
+      clamped(block(24, 4, 4, {length, width, height}), 0, length, {0, 0, -force / (width * height)});
   const auto tip = [&](Vec3d p) { return p.x == length; };
-  load.force_n = load_faces(mesh, tip, [&](Vec3d, Vec3d) { return Vec3d{0, 0, -force / (width * height)}; });
   const Solution s = solve(mesh, steel_like, fixed, {load}, iterative).front();
   const double inertia = width * height * height * height / 12, shear_modulus = 200000 / 2.6;
   const double deflection = force * length * length * length / (3 * 200000 * inertia) +
@@ -386,15 +379,7 @@ TEST(IterativeElasticity, SupportsOnMiddlesOfEdgesCount) {
 }
 
 TEST(IterativeElasticity, SameBitsOnOneAndTwoThreads) {
-  const TetMesh mesh = block(9, 8, 10, {10, 11, 12});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
-  LoadCase load;
-  load.force_n = load_faces(
-      mesh, [](Vec3d p) { return p.z == 12; },
-      [](Vec3d, Vec3d) {
-        return Vec3d{3, 1, -2};
-      });
+  const auto [mesh, fixed, load] = clamped(block(9, 8, 10, {10, 11, 12}), 2, 12, {3, 1, -2});
   const auto run = [&](std::size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return solve(mesh, steel_like, fixed, {load}, iterative).front();
@@ -408,30 +393,14 @@ TEST(IterativeElasticity, SameBitsOnOneAndTwoThreads) {
 
 TEST(IterativeElasticity, NearlyIncompressibleIsSlowerButRight) {
   const Material rubber{.young_mpa = 10, .poisson = 0.49};
-  const TetMesh mesh = block(12, 4, 4, {30, 8, 8});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.x == 0; });
-  LoadCase load;
-  load.force_n = load_faces(
-      mesh, [](Vec3d p) { return p.x == 30; },
-      [](Vec3d, Vec3d) {
-        return Vec3d{0, 0, -0.01};
-      });
+  const auto [mesh, fixed, load] = clamped(block(12, 4, 4, {30, 8, 8}), 0, 30, {0, 0, -0.01});
   const Solution s = solve(mesh, rubber, fixed, {load}, iterative).front();
   expect_same(solve(mesh, rubber, fixed, {load}).front(), s, 1e-6);
   EXPECT_LT(s.iterations, 200);
 }
 
 TEST(IterativeElasticity, ProgressRisesToOneAndCancelIsSeen) {
-  const TetMesh mesh = block(8, 8, 8, {10, 10, 10});
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
-  LoadCase load;
-  load.force_n = load_faces(
-      mesh, [](Vec3d p) { return p.z == 10; },
-      [](Vec3d, Vec3d) {
-        return Vec3d{1, 0, 0};
-      });
+  const auto [mesh, fixed, load] = clamped(block(8, 8, 8, {10, 10, 10}), 2, 10, {1, 0, 0});
   std::vector<double> seen;
   const Context watched([&](double f, std::string_view) { seen.push_back(f); }, {});
   static_cast<void>(solve(mesh, steel_like, fixed, {load, load}, iterative, watched));
@@ -467,17 +436,10 @@ TEST(IterativeElasticity, ABodyThatHangsByAnEdgeIsRefused) {
     for (auto& node : tet) node = number[node];
     mesh.tets.push_back(tet);
   }
-  std::vector<Fixed> fixed;
-  fix(fixed, mesh, {0, 1, 2}, [](Vec3d p) { return p.z == 0; });
-  LoadCase load;
-  load.force_n = load_faces(
-      mesh, [](Vec3d p) { return p.z == 6; },
-      [](Vec3d, Vec3d) {
-        return Vec3d{0, 0, -1};
-      });
+  const Clamped swing = clamped(mesh, 2, 6, {0, 0, -1});
   for (const SolveParams& params : {SolveParams{}, iterative}) {
     try {
-      static_cast<void>(solve(mesh, steel_like, fixed, {load}, params));
+      static_cast<void>(solve(swing.mesh, steel_like, swing.fixed, {swing.load}, params));
       FAIL() << "a swing was solved, limit " << params.direct_limit;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), Code::SolverFailed);

@@ -85,6 +85,17 @@ TEST(Report, ShapesOfValues) {
   EXPECT_EQ(json::parse(to_json(Report{}))["parts"], json::array());
 }
 
+TEST(Report, LayersAreThereIfSomethingWasSliced) {
+  Report report;
+  EXPECT_FALSE(json::parse(to_json(report)).contains("slices"));
+  report.slices = {{"left", 2, 0.5, {0.1, 0.2}, 30, 40, 3, {4, 2}}, {"right", 1, 0.5, {0.1, 0.2}, 30, 40, 0.25, {0.5}}};
+  const json slices = json::parse(to_json(report))["slices"];
+  EXPECT_EQ(slices["volume_mm3"], 3.25);
+  EXPECT_EQ(slices["plates"][0].dump(),
+            R"({"area_mm2":[4.0,2.0],"layer_mm":0.5,"layers":2,"name":"left","pixel_mm":[0.1,0.2],"size_px":[30,40],)"
+            R"("volume_mm3":3.0})");
+}
+
 TEST(Report, TheRecipeInItIsARecipe) {
   Report report;
   report.recipe = preset("paper");

@@ -87,6 +87,16 @@ struct StrengthReport {
   int iterations = 0;
   double residual = 0;
 };
+/// The layers of one plate.
+struct PlateReport {
+  std::string name;
+  int layers = 0;
+  double layer_mm = 0;
+  Vec2d pixel_mm{};
+  int width = 0, height = 0;  ///< Pixels.
+  double volume_mm3 = 0;
+  std::vector<double> area_mm2;  ///< One per layer.
+};
 struct Report {
   std::string command;
   Recipe recipe;
@@ -100,8 +110,11 @@ struct Report {
   SolidReport solid;
   MeshCheck mesh;
   std::vector<StrengthReport> strength;  ///< Empty if it was not asked for.
+  std::vector<PlateReport> slices;       ///< Empty if nothing was sliced; then the report has no such key.
   std::vector<StageReport> stages;
   std::vector<std::string> warnings;
+
+  [[nodiscard]] double sliced_mm3() const;  ///< Of all plates.
 };
 /// Schema 1, pretty, keys in a fixed order; no NaN or infinity ever (null instead). What a run does not measure is
 /// given as NaN.
