@@ -12,8 +12,9 @@
 namespace fibrolite {
 namespace {
 
-constexpr double clean_area = 3;      // a section larger than this many discs of the loop's radius is not the limb's
-constexpr double least_purity = 0.5;  // of a piece: the share that a thin region fills
+constexpr double clean_area = 3;         // a section larger than this many discs of the loop's radius is not the limb's
+constexpr std::size_t least_links = 12;  // between two pieces; fewer are where cuts cross
+constexpr double least_purity = 0.5;     // of a piece: the share that a thin region fills
 
 int most_frequent(const std::vector<std::int32_t>& samples, const std::vector<std::int32_t>& of) {
   std::map<int, std::size_t> votes;
@@ -187,11 +188,46 @@ CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts, double min
     }
     if (separating.size() == cuts.size()) {
       result.cuts = std::move(cuts);
+      result.shared.assign(result.cuts.size(), 0);
       result.of = std::move(c.of);
       result.count = c.count;
       return result;
     }
     cuts = std::move(separating);
+  }
+}
+
+void part_by_pairs(const Anatomy& anatomy, CutPieces& pieces) {
+  const VoxelBody& body = anatomy.body;
+  const CutPieces whole = std::move(pieces);
+  pieces = {};
+  pieces.links = whole.links;
+  pieces.of = whole.of;
+  pieces.count = whole.count;
+  for (std::size_t c = 0; c < whole.cuts.size(); ++c) {
+    const std::vector<std::int32_t>&near = whole.severed[c].near, &far = whole.severed[c].far;
+    std::map<std::array<int, 2>, Severed> pairs;
+    for (const std::int32_t s : near) {
+      for (int d = 0; d < VoxelBody::directions; ++d) {
+        if ((body.links[static_cast<std::size_t>(s)] >> static_cast<unsigned>(d) & 1U) == 0) continue;
+        const std::int32_t n = body.neighbour(s, d);
+        const std::array<int, 2> pair{whole.of[static_cast<std::size_t>(s)], whole.of[static_cast<std::size_t>(n)]};
+        if (pair[0] == pair[1] || !std::binary_search(far.begin(), far.end(), n)) continue;
+        pairs[pair].near.push_back(s);
+        pairs[pair].far.push_back(n);
+      }
+    }
+    std::erase_if(pairs, [](const auto& pair) { return pair.second.near.size() < least_links; });
+    for (auto& [sides, severed] : pairs) {
+      for (auto* side : {&severed.near, &severed.far}) {
+        std::sort(side->begin(), side->end());
+        side->erase(std::unique(side->begin(), side->end()), side->end());
+      }
+      pieces.cuts.push_back(whole.cuts[c]);
+      pieces.sides.push_back(sides);
+      pieces.severed.push_back(std::move(severed));
+      pieces.shared.push_back(pairs.size() > 1 ? 1 : 0);
+    }
   }
 }
 

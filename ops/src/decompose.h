@@ -32,6 +32,7 @@ struct CutPieces {
   std::vector<Section> cuts;              ///< Those that separate.
   std::vector<std::array<int, 2>> sides;  ///< Piece on the near and on the far side of each.
   std::vector<Severed> severed;           ///< Samples next to each.
+  std::vector<std::uint8_t> shared;       ///< 1: other pairs of pieces meet in the same section, as another cut.
   Links links;
   std::vector<std::int32_t> of;  ///< Piece per inside sample.
   int count = 0;
@@ -40,6 +41,9 @@ struct CutPieces {
 };
 /// Cuts that do not separate are dropped; crumbs (below `min_area` of the surface) go to the piece they hang on.
 [[nodiscard]] CutPieces cut_body(const Anatomy& anatomy, std::vector<Section> cuts, double min_area);
+
+/// Cuts that cross others part more than one pair of pieces: one cut for each pair that shares more than a few links.
+void part_by_pairs(const Anatomy& anatomy, CutPieces& pieces);
 
 /// A limb wider than this many times its thickness is a sheet, and fibres along it would bear nothing across.
 inline constexpr double flattest_limb = 2.5;

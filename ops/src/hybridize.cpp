@@ -75,7 +75,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   });
   const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
   out.body = distance_to(body);
-  const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, assembly);
+  const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, recipe, assembly);
   const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
     return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()}, c);
@@ -86,12 +86,13 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     std::vector<Shape> regions;
     for (const Part& part : out.parts.parts) regions.push_back(part.region());
     report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
-    report_joints(out.interfaces, out.joints, demand_n, recipe.material, report);
+    report_joints(out.interfaces, out.joints, demand_n, recipe, report);
     report_solid(tied, body, recipe.material, report);
     report_weak_places(out.parts, fills, body, out.solid, recipe, params.infill, report, c);
   });
   if (params.function) {
-    const Shape smooth = compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, assembly);
+    const Shape smooth =
+        compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, recipe, assembly);
     out.printed = as_function(smooth, body, tied);
   }
   if (params.steps) out.steps = steps(body, raw, out, fills, tied.struts, assembly);

@@ -19,6 +19,8 @@ constexpr int least_px = 16;  // smaller sections are slits between sampling and
 constexpr double least_share =
     0.03;  // of the cut's largest section: slivers where the plane leaves the border of the parts
 
+constexpr double least_shared = 0.01;  // of the body's whole section
+
 bool column_first(const Parts& parts, const Cut& cut) {
   const auto kind = [&](int id) { return parts.parts[static_cast<std::size_t>(id)].kind(); };
   if (kind(cut.a) != kind(cut.b)) return kind(cut.a) == Kind::Column;
@@ -36,17 +38,23 @@ Cut turned(const Cut& cut) {
 
 }  // namespace
 
+bool Interface::parts_here(const Labels& labels, Vec2d local, double step_mm) const {
+  return labels.label(frame.to_world({local.x, local.y, -step_mm})) == a &&
+         labels.label(frame.to_world({local.x, local.y, step_mm})) == b;
+}
+
 std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const Shape& body, double pixel_mm) {
   const double radius = disc_margin * cut.radius_mm;
   const double pixel = std::max(pixel_mm, radius / max_half_side_px);
   const PlaneGrid grid = PlaneGrid::about(cut.frame, radius, pixel, 1);
   const FloatImage depth = sample(body, grid);
+  const Interface whole{.a = cut.a, .b = cut.b, .frame = cut.frame};
   Image<std::uint8_t> mask(grid.width, grid.height);
   for (int j = 0; j < grid.height; ++j)
     for (int i = 0; i < grid.width; ++i) {
       if (depth(i, j) >= 0 || norm(grid.local(i, j)) > radius) continue;
       // The disc may also cross other limbs, or run inside one part: only where it parts a from b it is an interface.
-      mask(i, j) = labels.label(grid.world(i, j, -pixel)) == cut.a && labels.label(grid.world(i, j, pixel)) == cut.b;
+      mask(i, j) = whole.parts_here(labels, grid.local(i, j), pixel);
     }
   const Regions found = regions_of(mask);
   const auto count = static_cast<std::size_t>(found.count);
@@ -60,7 +68,10 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
   each([&](std::size_t r, Vec2d p) { center[r] = center[r] + (1.0 / static_cast<double>(found.pixels[r])) * p; });
   each([&](std::size_t r, Vec2d p) { reach[r] = std::max(reach[r], norm(p - center[r])); });
   const std::int64_t largest = count == 0 ? 0 : *std::max_element(found.pixels.begin(), found.pixels.end());
-  const double least = std::max<double>(least_px, least_share * static_cast<double>(largest));
+  // Where other pairs meet in the same section too, there may be nothing but a sliver of this one.
+  const auto of_body = std::count_if(depth.pixels.begin(), depth.pixels.end(), [](float d) { return d < 0; });
+  const double least = std::max({static_cast<double>(least_px), least_share * static_cast<double>(largest),
+                                 cut.shared ? least_shared * static_cast<double>(of_body) : 0.0});
   std::vector<Interface> result;
   for (std::size_t r = 0; r < count; ++r) {
     if (static_cast<double>(found.pixels[r]) < least) continue;
@@ -71,6 +82,7 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
     section.frame.origin = cut.frame.to_world({center[r].x, center[r].y, 0});
     section.radius_mm = reach[r] + pixel;
     section.area_mm2 = static_cast<double>(found.pixels[r]) * pixel * pixel;
+    if (cut.shared) section.within = labels;
     result.push_back(section);
   }
   return result;
@@ -87,8 +99,7 @@ double demand_n(const Interface& section, const Labels& labels, const Shape& bod
   for (int j = 0; j < grid.height; ++j)
     for (int i = 0; i < grid.width; ++i) {
       if (depth(i, j) >= 0 || norm(grid.local(i, j)) > section.radius_mm) continue;
-      if (labels.label(grid.world(i, j, -pixel)) != section.a || labels.label(grid.world(i, j, pixel)) != section.b)
-        continue;
+      if (!section.parts_here(labels, grid.local(i, j), pixel)) continue;
       sum += traction_mpa(grid.world(i, j, 0), section.frame.z);
       ++points;
     }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -109,15 +110,21 @@ Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b,
   context.progress(0.5);
 
   const Shape lumen = offset(body, -shell_mm);
-  const auto side = [&](const Layer& layer, const Frame& frame, const Shape& crystal, std::string_view name) {
+  const auto contact_of_side = [&](const Layer& layer, const Frame& frame, const Shape& fill, bool is_crystal,
+                                   std::string_view name) {
+    const Face face = face_of(layer, frame, fill, lumen, params.layer_mm);
+    const double touching = contact_area_mm2(layer, face);
+    if (!is_crystal) return touching;
     const Random own(seed, name, static_cast<std::uint64_t>(index));
-    SupportColumns found = support_columns(layer, frame, crystal, stick_mm, lumen, params, own, context);
+    SupportColumns found = support_columns(layer, frame, fill, face, stick_mm, lumen, params, own, context);
     joint.columns.insert(joint.columns.end(), found.columns.begin(), found.columns.end());
     joint.columns_dropped += found.dropped;
-    joint.contact_area_mm2 = found.contact_area_mm2;
+    return touching +
+           static_cast<double>(found.columns.size()) * std::numbers::pi / 4 * params.column_mm * params.column_mm;
   };
-  if (crystal_a) side(turned(joint.layer), turned(interface.frame), fill_a, "joint.a");
-  if (crystal_b) side(joint.layer, interface.frame, fill_b, "joint");
+  joint.contact_area_mm2 =
+      std::min(contact_of_side(turned(joint.layer), turned(interface.frame), fill_a, crystal_a, "joint.a"),
+               contact_of_side(joint.layer, interface.frame, fill_b, crystal_b, "joint"));
 
   const double lipschitz = std::max({1.0, fill_a.lipschitz(), fill_b.lipschitz(), body.lipschitz()});
   Shape slab(std::make_shared<Slab>(joint.layer, interface.frame, params.layer_mm, lipschitz));

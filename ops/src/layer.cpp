@@ -18,10 +18,15 @@ constexpr std::int64_t least_px = 3;  // smaller regions are grazes of a stick, 
 
 /// The body's section that the interface stands for: the region of the disc whose centroid is nearest the frame's
 /// origin.
-Image<std::uint8_t> own_section(const PlaneGrid& grid, const FloatImage& depth, double radius_mm) {
+Image<std::uint8_t> own_section(const Interface& interface, const PlaneGrid& grid, const FloatImage& depth,
+                                double radius_mm) {
   Image<std::uint8_t> inside(grid.width, grid.height);
   for (int j = 0; j < grid.height; ++j)
-    for (int i = 0; i < grid.width; ++i) inside(i, j) = depth(i, j) <= 0 && norm(grid.local(i, j)) <= radius_mm;
+    for (int i = 0; i < grid.width; ++i) {
+      const Vec2d at = grid.local(i, j);
+      inside(i, j) = depth(i, j) <= 0 && norm(at) <= radius_mm &&
+                     (!interface.within || interface.parts_here(*interface.within, at, grid.pixel_mm));
+    }
   const Regions found = regions_of(inside);
   std::vector<Vec2d> center(static_cast<std::size_t>(found.count));
   for (int j = 0; j < grid.height; ++j)
@@ -80,7 +85,7 @@ Layer transient_layer(const Interface& interface, const Shape& fill_a, const Sha
                       double shell_mm, double pixel_mm, const JointParams& params) {
   const PlaneGrid grid = PlaneGrid::about(interface.frame, interface.radius_mm, pixel_mm, rim_px + 3);
   const FloatImage depth = sample(body, grid), a = sample(fill_a, grid), b = sample(fill_b, grid);
-  const Image<std::uint8_t> section = own_section(grid, depth, interface.radius_mm + pixel_mm);
+  const Image<std::uint8_t> section = own_section(interface, grid, depth, interface.radius_mm + pixel_mm);
   const FloatImage rim = rim_distance(section, pixel_mm);
 
   Layer layer;
@@ -98,6 +103,11 @@ Layer transient_layer(const Interface& interface, const Shape& fill_a, const Sha
   drop_grazes(layer);
   layer.regions_before = regions(layer);
   layer.union_area_mm2 = area_mm2(layer, depth, rim);
+  if (layer.regions_before > 1) {
+    Layer other = layer;
+    join_regions(other, section, params.bridge == Bridge::Mst ? Bridge::Bbox : Bridge::Mst, params.min_wall_mm);
+    layer.other_bridge_area_mm2 = std::max(0.0, area_mm2(other, depth, rim) - layer.union_area_mm2);
+  }
   join_regions(layer, section, params.bridge, params.min_wall_mm);
   layer.bridge_area_mm2 = std::max(0.0, area_mm2(layer, depth, rim) - layer.union_area_mm2);
   layer.regions_after = regions(layer);

@@ -8,6 +8,7 @@
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/text.h"
+#include "json_reader.h"
 
 namespace fibrolite {
 namespace {
@@ -17,83 +18,18 @@ using Json = nlohmann::ordered_json;
 constexpr std::pair<Direction::Of, const char*> words[] = {
     {Direction::Of::Up, "up"}, {Direction::Of::Down, "down"}, {Direction::Of::Slanted, "slanted"}};
 
-/// A value and where it stands.
-class Reader {
- public:
-  Reader(const Json& json, std::string key, const std::string& source)
-      : json_(json), key_(std::move(key)), source_(source) {}
+using Reader = JsonReader;
 
-  [[noreturn]] void refuse(const std::string& accepts) const {
-    const std::string given = json_.dump(-1, ' ', false, Json::error_handler_t::replace);
-    throw Error(Code::BadRecipe, key_ + " cannot be " + (given.size() > 60 ? given.substr(0, 57) + "..." : given),
-                source_, "use " + accepts);
-  }
-  [[nodiscard]] double number() const {
-    if (!json_.is_number()) refuse("a number");
-    return json_.get<double>();
-  }
-  [[nodiscard]] int count() const {
-    if (!json_.is_number_unsigned() || json_.get<std::uint64_t>() > 1000000) refuse("a whole number, 0 or more");
-    return json_.get<int>();
-  }
-  [[nodiscard]] std::string text() const {
-    if (!json_.is_string()) refuse("a name in quotes");
-    return json_.get<std::string>();
-  }
-  [[nodiscard]] Rgb color() const {
-    const std::string given = json_.is_string() ? json_.get<std::string>() : std::string();
-    if (given.size() != 7 || given[0] != '#' || given.find_first_not_of("0123456789abcdefABCDEF", 1) != given.npos)
-      refuse("a colour, \"#rrggbb\"");
-    const unsigned long value = std::stoul(given.substr(1), nullptr, 16);
-    return {static_cast<std::uint8_t>(value >> 16), static_cast<std::uint8_t>((value >> 8) & 255U),
-            static_cast<std::uint8_t>(value & 255U)};
-  }
-  [[nodiscard]] Vec3d vector(const std::string& accepts = "[x, y, z]") const {
-    if (!json_.is_array() || json_.size() != 3) refuse(accepts);
-    for (const Json& entry : json_)
-      if (!entry.is_number()) refuse(accepts);
-    return {json_[0].get<double>(), json_[1].get<double>(), json_[2].get<double>()};
-  }
-  [[nodiscard]] Direction direction() const {
-    for (const auto& [of, word] : words)
-      if (json_ == word) return {of, {}};
-    return {Direction::Of::World, vector("[x, y, z] or \"up\", \"down\", \"slanted\"")};
-  }
-  /// Calls the reader of each key that is there; the others keep what they are.
-  using Keys = std::vector<std::pair<std::string, std::function<void(const Reader&)>>>;
-  void object(const Keys& keys) const {
-    if (!json_.is_object()) refuse("an object, { ... }");
-    for (const auto& item : json_.items()) {
-      const std::string& name = item.key();
-      const auto known = std::find_if(keys.begin(), keys.end(), [&](const auto& key) { return key.first == name; });
-      if (known != keys.end()) {
-        known->second(Reader(item.value(), key_ + "." + name, source_));
-        continue;
-      }
-      std::vector<std::string> names;
-      for (const auto& key : keys) names.push_back(key.first);
-      throw Error(Code::BadRecipe, "unknown key " + key_ + "." + name, source_,
-                  "did you mean " + nearest_name(name, names) + "?");
-    }
-  }
-  void list(const std::function<void(const Reader&)>& entry) const {
-    if (!json_.is_array()) refuse("a list, [ ... ]");
-    for (std::size_t i = 0; i < json_.size(); ++i)
-      entry(Reader(json_[i], key_ + "[" + std::to_string(i) + "]", source_));
-  }
-  [[nodiscard]] bool has(const char* name) const { return json_.is_object() && json_.contains(name); }
-  [[nodiscard]] bool is_list() const { return json_.is_array(); }
-
- private:
-  const Json& json_;
-  std::string key_;
-  const std::string& source_;
-};
+Direction direction(const Reader& reader) {
+  for (const auto& [of, word] : words)
+    if (reader.is(word)) return {of, {}};
+  return {Direction::Of::World, reader.vector("[x, y, z] or \"up\", \"down\", \"slanted\"")};
+}
 
 EndShare end_share(const Reader& reader) {
   EndShare end;
   reader.object({{"share", [&](const Reader& r) { end.share = r.number(); }},
-                 {"along", [&](const Reader& r) { end.along = r.direction(); }}});
+                 {"along", [&](const Reader& r) { end.along = direction(r); }}});
   return end;
 }
 
@@ -104,16 +40,9 @@ HalfSpace half_space(const Reader& reader) {
   return half;
 }
 
-Box3d box(const Reader& reader) {
-  std::vector<Vec3d> corners;
-  reader.list([&](const Reader& r) { corners.push_back(r.vector()); });
-  if (corners.size() != 2) reader.refuse("the least and the greatest corner, [[x, y, z], [x, y, z]]");
-  return {corners[0], corners[1]};
-}
-
 Selection selection(const Reader& reader) {
   Selection where;
-  reader.object({{"box_mm", [&](const Reader& r) { where.box_mm = box(r); }},
+  reader.object({{"box_mm", [&](const Reader& r) { where.box_mm = r.box(); }},
                  {"half_space",
                   [&](const Reader& r) {
                     const auto add = [&](const Reader& one) { where.half_spaces.push_back(half_space(one)); };
@@ -126,14 +55,14 @@ Selection selection(const Reader& reader) {
                   [&](const Reader& r) {
                     where.painted = Paint{r.color(), {}};
                   }},
-                 {"seen_from", [&](const Reader& r) { where.seen_from = r.direction(); }}});
+                 {"seen_from", [&](const Reader& r) { where.seen_from = direction(r); }}});
   return where;
 }
 
 Support support(const Reader& reader) {
   Support support;
   reader.object({{"where", [&](const Reader& r) { support.where = selection(r); }},
-                 {"sliding", [&](const Reader& r) { support.sliding = r.direction(); }}});
+                 {"sliding", [&](const Reader& r) { support.sliding = direction(r); }}});
   return support;
 }
 
@@ -148,13 +77,13 @@ Force force(const Reader& reader) {
   }
   if (reader.has("gravity")) {
     Gravity gravity;
-    reader.object({{"gravity", [&](const Reader& r) { gravity.direction = r.direction(); }}});
+    reader.object({{"gravity", [&](const Reader& r) { gravity.direction = direction(r); }}});
     return gravity;
   }
   TotalForce total;
   // The other two are named here for the sake of "did you mean".
   reader.object({{"force_n", [&](const Reader& r) { total.newton = r.number(); }},
-                 {"direction", [&](const Reader& r) { total.direction = r.direction(); }},
+                 {"direction", [&](const Reader& r) { total.direction = direction(r); }},
                  {"where", [&](const Reader& r) { total.where = selection(r); }},
                  {"pressure_mpa", [](const Reader&) {}},
                  {"gravity", [](const Reader&) {}}});
@@ -171,7 +100,6 @@ LoadCase load_case(const Reader& reader) {
   return load;
 }
 
-Json written(Vec3d v) { return Json::array({v.x, v.y, v.z}); }
 Json written(const Direction& d) {
   for (const auto& [of, word] : words)
     if (d.of == of) return word;
@@ -180,7 +108,7 @@ Json written(const Direction& d) {
 Json written(const EndShare& end) { return {{"share", end.share}, {"along", written(end.along)}}; }
 Json written(const Selection& where) {
   Json json = Json::object();
-  if (where.box_mm) json["box_mm"] = Json::array({written(where.box_mm->min), written(where.box_mm->max)});
+  if (where.box_mm) json["box_mm"] = written(*where.box_mm);
   for (const HalfSpace& half : where.half_spaces)
     json["half_space"].push_back(Json{{"point_mm", written(half.point_mm)}, {"normal", written(half.normal)}});
   if (where.lowest) json["lowest"] = written(*where.lowest);

@@ -99,6 +99,8 @@ Part PartMaker::make(Fields fields) {
   Part part;
   part.id_ = fields.id;
   part.kind_ = fields.kind;
+  part.candidates_ = std::move(fields.candidates);
+  part.chosen_ = fields.chosen;
   part.region_ = std::move(fields.region);
   part.bounds_ = fields.bounds_mm;
   part.axis_ = std::move(fields.axis);

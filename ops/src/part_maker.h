@@ -2,7 +2,9 @@
 // The only maker of parts.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "fibrolite/ops/part.h"
 
@@ -13,6 +15,8 @@ class PartMaker {
   struct Fields {
     int id = 0;
     Kind kind = Kind::Bulk;
+    std::vector<int> candidates{0};
+    std::optional<PartInfill> chosen{};
     Shape region;
     Box3d bounds_mm;
     Axis axis;

@@ -27,6 +27,7 @@ constexpr double even_diameters = 1.5;   // 90th over 10th percentile: below thi
 double threshold_at(std::size_t step) { return sweep_from + sweep_step * static_cast<double>(step); }
 
 void check_params(const PartitionParams& p) {
+  check_overrides(p.overrides);
   const auto out_of = [](double v, double lo, double hi) { return !(v >= lo && v <= hi); };
   if (p.threshold && out_of(*p.threshold, 0, 1)) {
     throw Error(Code::BadRecipe, "the threshold must be 0 to 1", "partition.threshold", "leave it out for auto");
@@ -129,6 +130,40 @@ Choice whole_body(const Anatomy& anatomy, double min_area) {
   Choice choice;
   choice.limbs.pieces = cut_body(anatomy, {}, min_area);
   choice.limbs.limb.assign(static_cast<std::size_t>(choice.limbs.pieces.count), 0);
+  return choice;
+}
+
+// The connected section of the body in a plane, through the point or the nearest place within a voxel of it.
+Section own_section(const Anatomy& anatomy, const Overrides::Plane& plane, std::size_t number) {
+  const Vec3d here = anatomy.frame.to_local(plane.point_mm);
+  const Frame frame = frame_along(here, anatomy.frame.to_local(plane.point_mm + normalized(plane.normal)) - here);
+  const VoxelBody& body = anatomy.body;
+  // A reach that is too small finds no end of the section, one that is too large sees it too coarsely.
+  for (double reach = 2 * body.voxel_mm; reach < 2 * bounds(*anatomy.surface).longest_side(); reach *= 1.5)
+    if (std::optional<Section> found = section(body, frame, reach)) return *found;
+  throw Error(Code::BadRecipe, "this plane meets no section of the model near its point",
+              std::string("partition.overrides.cuts[").append(std::to_string(number)).append("]"),
+              "put point_mm inside the model");
+}
+
+// The pieces between the user's own cuts; any of them may be a limb.
+Choice own_choice(const Anatomy& anatomy, const PartitionParams& params) {
+  std::vector<Section> cuts;
+  for (std::size_t i = 0; i < params.overrides.cuts.size(); ++i)
+    cuts.push_back(own_section(anatomy, params.overrides.cuts[i], i));
+  const std::size_t wanted = cuts.size();
+  Choice choice;
+  choice.limbs.pieces = cut_body(anatomy, std::move(cuts), params.min_area);
+  choice.limbs.limb.assign(static_cast<std::size_t>(choice.limbs.pieces.count), 1);
+  const std::size_t left = choice.limbs.pieces.cuts.size();
+  part_by_pairs(anatomy, choice.limbs.pieces);
+  if (left < wanted) {
+    choice.limbs.notes.push_back(
+        std::to_string(wanted - left) +
+        " of the cuts in partition.overrides part nothing: a ring takes two, and what is smaller than "
+        "partition.min_area stays with its neighbour");
+  }
+  choice.found = true;
   return choice;
 }
 
@@ -266,7 +301,10 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   Partition result;
   Choice choice;
   const double ratio = diameter_ratio(anatomy);
-  if (ratio < even_diameters) {
+  const bool own = !params.overrides.cuts.empty();
+  if (own) {
+    choice = own_choice(anatomy, params);
+  } else if (ratio < even_diameters) {
     choice = whole_body(anatomy, params.min_area);
     result.notes.push_back("the diameters hardly differ (90th over 10th percentile " + number_text(ratio, 3) +
                            "): the model is parted by its branches alone");
@@ -291,7 +329,8 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   const std::vector<Section> by_threshold = choice.limbs.pieces.cuts;
   // A body of uneven thickness without limbs is a lump until it is clearly drawn out.
   const double least_slenderness = params.min_slenderness * (by_threshold.empty() && ratio >= even_diameters ? 2 : 1);
-  CutPieces pieces = split_branches(anatomy, std::move(choice.limbs.pieces), limb_sample, params.min_area, context);
+  CutPieces pieces = std::move(choice.limbs.pieces);
+  if (!own) pieces = split_branches(anatomy, std::move(pieces), limb_sample, params.min_area, context);
   std::vector<Described> described = describe_all(anatomy, pieces, limb_sample, least_slenderness, context);
   for (;;) {
     // A fork between lumps that no fibre could run through: parting them gains nothing.
@@ -317,10 +356,17 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
     name[static_cast<std::size_t>(described[i].piece)] = static_cast<int>(i);
     result.candidates.push_back(std::move(described[i].candidate));
   }
+  for (const Overrides::PartChoice& named : params.overrides.parts) {
+    if (const auto last = static_cast<int>(result.candidates.size()) - 1; named.id > last) {
+      throw Error(Code::BadRecipe, "there is no part " + std::to_string(named.id), "partition.overrides.parts",
+                  "use 0 to " + std::to_string(last) + "; fibrolite partition shows them");
+    }
+    result.candidates[static_cast<std::size_t>(named.id)].chosen = named.infill;
+  }
   for (std::size_t c = 0; c < pieces.cuts.size(); ++c) {
     const auto& side = pieces.sides[c];
     result.cuts.push_back({name[static_cast<std::size_t>(side[0])], name[static_cast<std::size_t>(side[1])],
-                           pieces.cuts[c].frame, pieces.cuts[c].radius_mm});
+                           pieces.cuts[c].frame, pieces.cuts[c].radius_mm, own, pieces.shared[c] != 0});
   }
   context.progress(0.9);
   if (pieces.count > 1) result.labels = make_labels(make_label_samples(anatomy, pieces, name));

@@ -12,6 +12,7 @@
 #include "fibrolite/ops/recipe.h"
 #include "fibrolite/ops/text.h"
 #include "loads_json.h"
+#include "overrides_json.h"
 
 namespace fibrolite {
 namespace {
@@ -145,6 +146,12 @@ void read(const Json& json, std::vector<LoadCase>& value, Range, const Place& pl
   value = loads_from(json, place.source);
 }
 
+std::string accepts(const Overrides&, Range) {
+  return "an object with parts, cuts and solid, each a list: see docs/parts.md";
+}
+Json write(const Overrides& value) { return written(value); }
+void read(const Json& json, Overrides& value, Range, const Place& place) { value = overrides_from(json, place.source); }
+
 std::string accepts(const std::uint64_t&, Range) { return "a whole number, 0 or more"; }
 Json write(std::uint64_t value) { return value; }
 void read(const Json& json, std::uint64_t& value, Range, const Place& place) {
@@ -192,6 +199,8 @@ const std::vector<Field>& table() {
             "regions below this share of the surface join a neighbour"),
       field("partition.min_slenderness", &R::partition, &PartitionParams::min_slenderness, {0, 100},
             "a limb shorter than this many diameters is no column"),
+      field("partition.overrides", &R::partition, &PartitionParams::overrides,
+            "infill of single parts, cuts of your own, regions that stay solid"),
 
       field("verify.dominance", &R::verify, &VerifyParams::dominance, {1, 1000, true},
             "a column carries at least this many times more stress along its axis than across"),

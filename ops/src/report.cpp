@@ -43,6 +43,7 @@ Json to_json(const PartReport& part) {
                        {"von_mises", part.stress.von_mises},
                        {"load_cases", array(part.stress.cases)}};
   return {{"id", part.id},
+          {"candidates", part.candidates},
           {"kind", part.kind},
           {"infill", part.infill},
           {"volume_mm3", part.volume_mm3},
@@ -69,6 +70,7 @@ Json to_json(const InterfaceReport& interface) {
           {"layer_area_mm2", interface.layer_area_mm2},
           {"union_area_mm2", interface.union_area_mm2},
           {"bridge_area_mm2", interface.bridge_area_mm2},
+          {"bridge_mm3", {{"mst", interface.mst_bridge_mm3}, {"bbox", interface.bbox_bridge_mm3}}},
           {"contact_area_mm2", interface.contact_area_mm2},
           {"capacity_over_demand", interface.capacity_over_demand}};
 }

@@ -12,18 +12,18 @@
 
 namespace fibrolite {
 
-std::string infill_of(const Part& part, InfillKind run) {
+PartInfill infill_of(const Part& part, InfillKind run) {
   switch (run) {
     case InfillKind::Hybrid:
-      return part.kind() == Kind::Column ? "mfs" : "tcs";
+      return part.chosen().value_or(part.kind() == Kind::Column ? PartInfill::Mfs : PartInfill::Tcs);
     case InfillKind::Tcs:
-      return "tcs";
+      return PartInfill::Tcs;
     case InfillKind::Mfs:
-      return "mfs";
+      return PartInfill::Mfs;
     case InfillKind::Solid:
-      return "solid";
+      break;
   }
-  return {};
+  return PartInfill::Solid;
 }
 
 std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const Context& context) {
@@ -36,9 +36,14 @@ std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const Conte
 
 Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
           const std::optional<Shape>& thickness) {
-  const std::string name = infill_of(part, run);
-  if (name == "tcs") return thickness ? generate(part, recipe.tcs, *thickness) : generate(part, recipe.tcs);
-  if (name == "mfs") return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
+  switch (infill_of(part, run)) {
+    case PartInfill::Tcs:
+      return thickness ? generate(part, recipe.tcs, *thickness) : generate(part, recipe.tcs);
+    case PartInfill::Mfs:
+      return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
+    case PartInfill::Solid:
+      break;
+  }
   return {.shape = everything()};
 }
 
@@ -54,8 +59,10 @@ std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& in
   for (std::size_t i = 0; i < interfaces.size(); ++i) {
     const Interface& at = interfaces[i];
     const auto a = static_cast<std::size_t>(at.a), b = static_cast<std::size_t>(at.b);
-    const bool crystal_a = parts.parts[a].kind() == Kind::Bulk, crystal_b = parts.parts[b].kind() == Kind::Bulk;
-    joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal_a, crystal_b, member, body,
+    const auto crystal = [&](std::size_t part) {
+      return infill_of(parts.parts[part], InfillKind::Hybrid) == PartInfill::Tcs;
+    };
+    joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal(a), crystal(b), member, body,
                           recipe.shell.thickness_mm, recipe.seed, static_cast<int>(i), recipe.joint, context));
     context.progress(static_cast<double>(i + 1) / static_cast<double>(interfaces.size()));
   }
@@ -63,12 +70,13 @@ std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& in
 }
 
 Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills, const std::vector<Joint>& joints,
-              InfillKind infill, const AssembleParams& params) {
+              InfillKind infill, const Recipe& recipe, const AssembleParams& params) {
   if (infill == InfillKind::Solid) return body;
   std::vector<FilledRegion> filled;
   for (std::size_t i = 0; i < fills.size(); ++i) filled.push_back({parts.parts[i].region(), fills[i].shape});
   std::vector<Shape> shapes;
   for (const Joint& joint : joints) shapes.push_back(joint.shape);
+  if (!recipe.partition.overrides.solid.empty()) shapes.push_back(kept_solid(recipe.partition.overrides));
   return assemble(body, filled, shapes, params);
 }
 

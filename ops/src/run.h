@@ -33,8 +33,8 @@ class Run {
   double from_ = 0;
 };
 
-/// "mfs", "tcs" or "solid": what a part gets in a run.
-[[nodiscard]] std::string infill_of(const Part& part, InfillKind run);
+/// What a part gets in a run: in a hybrid by its kind, unless the user says otherwise.
+[[nodiscard]] PartInfill infill_of(const Part& part, InfillKind run);
 /// How much thicker the crystal is where (TcsParams::grade); none if it is not graded.
 [[nodiscard]] std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const Context& context);
 [[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
@@ -49,7 +49,8 @@ class Run {
 [[nodiscard]] double tie_mm(const Recipe& recipe, double voxel_mm);
 
 [[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
-                            const std::vector<Joint>& joints, InfillKind infill, const AssembleParams& params);
+                            const std::vector<Joint>& joints, InfillKind infill, const Recipe& recipe,
+                            const AssembleParams& params);
 /// The printed solid as a function: the composed shape with its ties, mended wherever a sample of the solid says
 /// otherwise (specks that went, pores that were filled).
 [[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Tied& tied);
@@ -63,7 +64,7 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
                   InfillKind infill, Report& report);
 /// `demand_n`: one per interface.
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
-                   const std::vector<double>& demand_n, const Material& material, Report& report);
+                   const std::vector<double>& demand_n, const Recipe& recipe, Report& report);
 void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
 /// What hangs free, and what hangs on the shell by too thin a neck.
 void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,

@@ -34,7 +34,8 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
     PartReport row;
     row.id = part.id();
     row.kind = name(part.kind());
-    row.infill = infill_of(part, infill);
+    row.infill = name(infill_of(part, infill));
+    row.candidates = part.candidates();
     row.volume_mm3 = volumes[i].part_mm3;
     row.lumen_mm3 = volumes[i].lumen_mm3;
     row.infill_volume_mm3 = volumes[i].infill_mm3;
@@ -50,7 +51,7 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 }
 
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
-                   const std::vector<double>& demand_n, const Material& material, Report& report) {
+                   const std::vector<double>& demand_n, const Recipe& recipe, Report& report) {
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const Joint& joint = joints[i];
     InterfaceReport row;
@@ -65,11 +66,15 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
     row.columns_dropped = joint.columns_dropped;
     row.union_area_mm2 = joint.layer.union_area_mm2;
     row.bridge_area_mm2 = joint.layer.bridge_area_mm2;
+    row.mst_bridge_mm3 = row.bbox_bridge_mm3 = recipe.joint.layer_mm * joint.layer.bridge_area_mm2;
+    (recipe.joint.bridge == Bridge::Mst ? row.bbox_bridge_mm3 : row.mst_bridge_mm3) =
+        recipe.joint.layer_mm * joint.layer.other_bridge_area_mm2;
     row.layer_area_mm2 =
         joint.layer.pixel_mm * joint.layer.pixel_mm *
         static_cast<double>(std::count(joint.layer.solid.pixels.begin(), joint.layer.solid.pixels.end(), 1));
     row.contact_area_mm2 = joint.contact_area_mm2;
-    row.capacity_over_demand = joint.contact_area_mm2 * material.yield_mpa / demand_n[i];  // no demand: infinite, null
+    row.capacity_over_demand =
+        joint.contact_area_mm2 * recipe.material.yield_mpa / demand_n[i];  // no demand: infinite, null
     report.interfaces.push_back(row);
     append(report.warnings, joint.warnings);
   }

@@ -85,6 +85,8 @@ Parts placed(const Parts& parts, const Frame& frame) {
     result.parts.push_back(
         PartMaker::make({.id = part.id(),
                          .kind = part.kind(),
+                         .candidates = part.candidates(),
+                         .chosen = part.chosen(),
                          .region = result.labels.region(part.id()),
                          .bounds_mm = mapped(part.bounds_mm(), [&](Vec3d p) { return frame.to_world(p); }),
                          .axis = placed(part.axis(), frame),

@@ -94,8 +94,22 @@ bool apart(Vec2d p, const std::vector<Vec2d>& others, double distance) {
 
 }  // namespace
 
-SupportColumns support_columns(const Layer& layer, const Frame& frame, const Shape& crystal, double stick_mm,
-                               const Shape& lumen, const JointParams& params, Random random, const Context& context) {
+Face face_of(const Layer& layer, const Frame& frame, const Shape& fill, const Shape& lumen, double layer_mm) {
+  const PlaneGrid grid{frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height};
+  return {sample(fill, grid, layer_mm / 2), sample(lumen, grid, layer_mm / 2)};
+}
+
+double contact_area_mm2(const Layer& layer, const Face& face) {
+  double pixels = 0;
+  for (std::size_t i = 0; i < face.fill_mm.pixels.size(); ++i)
+    pixels += coverage(layer.distance_mm.pixels[i], layer.pixel_mm) * coverage(face.fill_mm.pixels[i], layer.pixel_mm) *
+              coverage(face.lumen_mm.pixels[i], layer.pixel_mm);
+  return pixels * layer.pixel_mm * layer.pixel_mm;
+}
+
+SupportColumns support_columns(const Layer& layer, const Frame& frame, const Shape& crystal, const Face& at_layer,
+                               double stick_mm, const Shape& lumen, const JointParams& params, Random random,
+                               const Context& context) {
   const double face = params.layer_mm / 2, step = stick_mm / 8;
   const FootGrid feet = feet_of(layer, stick_mm / 4, std::min(params.column_mm, params.min_wall_mm) / 4);
   const auto rays_from = [&](const std::vector<Vec2d>& from) {
@@ -115,17 +129,10 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
   }
   // Where the crystal stands on the layer by itself.
   const PlaneGrid grid{frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height};
-  const FloatImage crystal_at_face = sample(crystal, grid, face), lumen_at_face = sample(lumen, grid, face);
   std::vector<Vec2d> touching;
-  for (int y = 0; y < grid.height; ++y)
-    for (int x = 0; x < grid.width; ++x) {
-      if (layer.distance_mm(x, y) > grid.pixel_mm || crystal_at_face(x, y) > grid.pixel_mm) continue;
-      result.contact_area_mm2 += coverage(layer.distance_mm(x, y), grid.pixel_mm) *
-                                 coverage(crystal_at_face(x, y), grid.pixel_mm) *
-                                 coverage(lumen_at_face(x, y), grid.pixel_mm) * grid.pixel_mm * grid.pixel_mm;
-      if (layer.solid(x, y) == 0 || crystal_at_face(x, y) >= 0) continue;
-      if (x % feet.stride == 0 && y % feet.stride == 0) touching.push_back(grid.local(x, y));
-    }
+  for (int y = 0; y < grid.height; y += feet.stride)
+    for (int x = 0; x < grid.width; x += feet.stride)
+      if (layer.solid(x, y) != 0 && at_layer.fill_mm(x, y) < 0) touching.push_back(grid.local(x, y));
 
   std::vector<Vec2d> darts = under_crystal(feet, below, layer.pixel_mm, params.column_mm);
   for (std::size_t i = darts.size(); i > 1; --i) std::swap(darts[i - 1], darts[random.below(i)]);
@@ -147,8 +154,6 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
     result.columns.push_back({frame.to_world({darts[k].x, darts[k].y, 0}),
                               frame.to_world({darts[k].x, darts[k].y, *top[k]}), params.column_mm / 2});
   }
-  result.contact_area_mm2 +=
-      static_cast<double>(result.columns.size()) * std::numbers::pi / 4 * params.column_mm * params.column_mm;
   return result;
 }
 

@@ -216,11 +216,13 @@ void decide(Verdict& verdict, const Candidate& candidate, const std::vector<doub
   }
 }
 
-/// Touching bulk candidates get one number; columns keep their own. Numbers are not yet those of the parts.
+/// Touching bulk candidates get one number, unless the user parted them; columns keep their own. Numbers are not yet
+/// those of the parts.
 std::vector<std::size_t> merge_bulk(const Partition& partition, const std::vector<Verdict>& verdicts) {
   DisjointSets sets(verdicts.size());
   for (const Cut& cut : partition.cuts) {
     const auto a = static_cast<std::uint32_t>(cut.a), b = static_cast<std::uint32_t>(cut.b);
+    if (cut.kept || partition.candidates[a].chosen || partition.candidates[b].chosen) continue;
     if (verdicts[a].kind == Kind::Bulk && verdicts[b].kind == Kind::Bulk) sets.join(a, b);
   }
   std::vector<std::size_t> group;
@@ -275,9 +277,13 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
     const Candidate& candidate = partition.candidates[main];
     const bool merged = draft.members.size() > 1;
     std::string reason = verdicts[main].reason;
+    if (candidate.chosen) reason.append("; filled with ").append(name(*candidate.chosen)).append(" as the recipe says");
     if (merged) reason += "; " + std::to_string(draft.members.size()) + " touching bulk pieces are one part";
+    const std::vector<int> candidates(draft.members.begin(), draft.members.end());
     result.parts.parts.push_back(PartMaker::make({.id = static_cast<int>(id),
                                                   .kind = verdicts[main].kind,
+                                                  .candidates = candidates,
+                                                  .chosen = candidate.chosen,
                                                   .region = result.parts.labels.region(static_cast<int>(id)),
                                                   .bounds_mm = geometry[id].bounds_mm,
                                                   .axis = merged ? geometry[id].axis : candidate.axis,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "fibrolite/context.h"
@@ -17,6 +18,11 @@ struct Interface {
   Frame frame;           ///< Origin at the section's centroid.
   double radius_mm = 0;  ///< Of the disc that covers the section.
   double area_mm2 = 0;   ///< Of the body's section.
+  /// Of a section that other pairs of parts share: it reaches as far as these say that a lies beside b.
+  std::optional<Labels> within{};
+
+  /// Whether a point of the plane, seen `step_mm` to either side, lies between a and b.
+  [[nodiscard]] bool parts_here(const Labels& labels, Vec2d local, double step_mm) const;
 };
 /// The sections of the body in the plane of one cut, where it parts cut.a from cut.b; sampled at `pixel_mm` (coarser
 /// for a disc wider than 3000 pixels). Sections below 16 pixels or 3 % of the cut's largest are left out.

@@ -34,6 +34,7 @@ struct Layer {
   double pixel_mm = 0.1;
   int regions_before = 0, regions_after = 0;
   double union_area_mm2 = 0, bridge_area_mm2 = 0;
+  double other_bridge_area_mm2 = 0;  ///< What the rule that was not used would have taken.
 };
 /// Number of connected (8-neighbour) material regions of a layer: the connectivity check. A joint is sound iff this
 /// is 1.
@@ -49,9 +50,8 @@ struct Joint {
   Shape shape;  ///< Layer and columns, unclipped by the body.
   Layer layer;
   std::vector<Capsule> columns;
-  int columns_dropped = 0;  ///< Found no crystal within reach.
-  double contact_area_mm2 =
-      0;  ///< Layer that touches the crystal (b's, if both are) inside the lumen, columns included.
+  int columns_dropped = 0;      ///< Found no crystal within reach.
+  double contact_area_mm2 = 0;  ///< Layer that touches the fill inside the lumen, columns included: the lesser side.
   std::vector<std::string> warnings;
 };
 /// Support columns run along the interface's normal from the layer into each side's crystal (`crystal_a`, `crystal_b`:

@@ -2,6 +2,7 @@
 // A verified part of the model. Only verify() makes one.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +39,9 @@ class Part {
  public:
   [[nodiscard]] int id() const { return id_; }
   [[nodiscard]] Kind kind() const { return kind_; }
-  [[nodiscard]] const Shape& region() const { return region_; }  ///< p_i of Labels::region().
+  [[nodiscard]] const std::vector<int>& candidates() const { return candidates_; }  ///< Largest first.
+  [[nodiscard]] std::optional<PartInfill> chosen() const { return chosen_; }        ///< The user's infill, if any.
+  [[nodiscard]] const Shape& region() const { return region_; }                     ///< p_i of Labels::region().
   [[nodiscard]] const Box3d& bounds_mm() const { return bounds_; }
   [[nodiscard]] const Axis& axis() const { return axis_; }
   [[nodiscard]] double diameter_mm() const { return diameter_; }
@@ -52,6 +55,8 @@ class Part {
   Part() = default;
   int id_ = 0;
   Kind kind_ = Kind::Bulk;
+  std::vector<int> candidates_;
+  std::optional<PartInfill> chosen_;
   Shape region_;
   Box3d bounds_;
   Axis axis_;

@@ -9,6 +9,7 @@
 
 #include "fibrolite/context.h"
 #include "fibrolite/ops/diameter.h"
+#include "fibrolite/ops/overrides.h"
 #include "fibrolite/shape.h"
 
 namespace fibrolite {
@@ -18,6 +19,8 @@ struct Cut {
   int a = 0, b = 0;
   Frame frame;
   double radius_mm = 0;  ///< Of the disc about frame.origin that covers the section.
+  bool kept = false;     ///< The user's own: stays, even between two bulk parts.
+  bool shared = false;   ///< Other pairs meet in the same section: it counts only where a lies beside b.
 };
 
 /// The axis of a limb: a unit field and a centre line, from its interface (or one end) to its tip.
@@ -71,7 +74,8 @@ struct Candidate {
   double diameter_mm = 0;  ///< Median diameter of its faces.
   double length_mm = 0;    ///< Along the axis.
   Axis axis;
-  std::string reason;  ///< Why column-like or not, in words with numbers.
+  std::string reason;                  ///< Why column-like or not, in words with numbers.
+  std::optional<PartInfill> chosen{};  ///< The user's own choice; such a candidate stays a part of its own.
 };
 
 struct PartitionParams {
@@ -79,6 +83,7 @@ struct PartitionParams {
       threshold;                 ///< nsdf below this is column-like, 0 to 1; absent: auto, the most stable partition.
   double min_area = 0.012;       ///< Regions below this share of the surface join a neighbour; 0 to 0.5.
   double min_slenderness = 1.0;  ///< A limb shorter than this many diameters is no column.
+  Overrides overrides{};         ///< Its cuts take the place of the threshold.
 };
 struct Partition {
   std::vector<Candidate> candidates;  ///< Sorted by id; at least one.
@@ -88,8 +93,8 @@ struct Partition {
   double stable_from = 0, stable_to = 0;  ///< Range of thresholds that give the same partition (auto only).
   std::vector<std::string> notes;
 };
-/// @throws Error BadRecipe (a range above). Cost: a few seconds for 15 k faces. Source: paper Sec. 4.1; choice of
-/// threshold ours.
+/// @throws Error BadRecipe (a range above; an override that meets no section, or names a candidate that is not there).
+/// Cost: a few seconds for 15 k faces. Source: paper Sec. 4.1; choice of threshold ours.
 [[nodiscard]] Partition partition(const Proxy& proxy, const DiameterField& field, const PartitionParams& params = {},
                                   const Context& context = {});
 

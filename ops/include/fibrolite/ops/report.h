@@ -13,6 +13,7 @@ namespace fibrolite {
 
 struct PartReport {
   int id = 0;
+  std::vector<int> candidates;  ///< Of the partition, that it is made of.
   std::string kind, infill;
   double volume_mm3 = 0;         ///< Of the part of the body, on the fine grid.
   double lumen_mm3 = 0;          ///< Inside the shell.
@@ -29,6 +30,7 @@ struct InterfaceReport {
   double area_mm2 = 0;
   int regions_before = 0, regions_after = 0, columns = 0, columns_dropped = 0;
   double layer_area_mm2 = 0, union_area_mm2 = 0, bridge_area_mm2 = 0, contact_area_mm2 = 0;
+  double mst_bridge_mm3 = 0, bbox_bridge_mm3 = 0;  ///< Material of the bridges by either rule, whichever was used.
   double capacity_over_demand = 0;  ///< contact_area * yield / integral of the traction in the worst load case.
 };
 struct SolidReport {

@@ -57,7 +57,8 @@ struct Verification {
 /// degrees, at the same place), then each candidate on its own mesh with the coarse displacements on its cut faces, its
 /// own share of the load and of the support. A
 /// candidate is a column if it is column-like and its mean stress along its axis is `dominance` times that across in
-/// every load case that loads it. Across: the direction with the largest mean. Touching bulk candidates merge. Parts
+/// every load case that loads it. Across: the direction with the largest mean. Touching bulk candidates merge, but not
+/// across a cut that is kept, nor with one whose infill the user chose. Parts
 /// are numbered by volume, largest first. If a candidate's own mesh fails, the whole body's stresses in it decide, and
 /// a note says so.
 /// @throws Error SolverFailed; BadRecipe: a number out of range, a load case that check_loads() refuses, selects

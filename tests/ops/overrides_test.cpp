@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/overrides.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fibrolite/ops/hybridize.h"
+#include "fibrolite/random.h"
+#include "models.h"
+#include "refusal.h"
+
+namespace fibrolite {
+namespace {
+
+using testing::refusal;
+
+Mesh block(Vec3d size) {
+  Mesh mesh = testing::cube(1);
+  for (Vec3f& v : mesh.vertices) v = to_float({v.x * size.x, v.y * size.y, v.z * size.z});
+  return mesh;
+}
+
+/// Members thick enough for a voxel of 0.5 mm.
+Recipe sturdy() {
+  Recipe recipe;
+  recipe.tcs.stick_mm = recipe.mfs.wall_mm = recipe.joint.column_mm = recipe.joint.min_wall_mm = 1.0;
+  recipe.mfs.fibre_mm = 3;
+  return recipe;
+}
+
+struct Outcome {
+  Hybrid hybrid;
+  Report report;
+};
+Outcome run(const Mesh& mesh, const Recipe& recipe) {
+  Outcome out;
+  out.hybrid = hybridize(prepare({mesh, 1.0, {}}, {}), {.recipe = recipe, .voxel_mm = 0.5}, out.report);
+  return out;
+}
+
+TEST(Overrides, RecipeRoundTrip) {
+  const Recipe given = parse_recipe(R"({"partition": {"overrides": {
+      "parts": [{"id": 2, "infill": "solid"}, {"id": 0, "infill": "mfs"}],
+      "cuts": [{"point_mm": [1, 2, 3], "normal": [0, 0, 2]}],
+      "solid": [{"box_mm": [[0, 0, 0], [1, 2, 3]]},
+                {"cylinder": {"from_mm": [0, 0, 0], "to_mm": [0, 0, 9], "diameter_mm": 4}}]}}})",
+                                    Recipe{}, "test");
+  const Overrides& o = given.partition.overrides;
+  ASSERT_EQ(o.parts.size(), 2U);
+  EXPECT_EQ(o.parts[0].id, 2);
+  EXPECT_EQ(o.parts[0].infill, PartInfill::Solid);
+  EXPECT_EQ(o.cuts.at(0).point_mm, (Vec3d{1, 2, 3}));
+  EXPECT_EQ(std::get<Cylinder>(o.solid.at(1)).diameter_mm, 4);
+  EXPECT_EQ(to_json(parse_recipe(to_json(given), Recipe{}, "again")), to_json(given));
+}
+
+TEST(Overrides, WhatCannotBeIsRefusedByName) {
+  const auto refused = [](const std::string& overrides) {
+    return refusal([&] {
+      (void)parse_recipe(std::string(R"({"partition": {"overrides": )").append(overrides).append("}}"), Recipe{},
+                         "r.json");
+    });
+  };
+  const auto names = [](const std::string& text, const std::string& what) {
+    EXPECT_NE(text.find(what), std::string::npos) << text;
+  };
+  names(refused(R"({"part": []})"), "did you mean parts?");
+  names(refused(R"({"parts": [{"id": 1, "infill": "gold"}]})"), "partition.overrides.parts[0].infill");
+  names(refused(R"({"parts": [{"id": 1}]})"), "partition.overrides.parts[0]");
+  names(refused(R"({"parts": [{"id": 1, "infill": "tcs"}, {"id": 1, "infill": "mfs"}]})"), "named twice");
+  names(refused(R"({"cuts": [{"point_mm": [0, 0, 0], "normal": [0, 0, 0]}]})"), "partition.overrides.cuts[0]");
+  names(refused(R"({"solid": [{"box_mm": [[0, 0, 0], [1, 0, 1]]}]})"), "partition.overrides.solid[0]");
+  names(refused(R"({"solid": [{"cylinder": {"from_mm": [0, 0, 0], "to_mm": [0, 0, 0], "diameter_mm": 1}}]})"),
+        "partition.overrides.solid[0]");
+  names(refused(R"({"solid": [{}]})"), "partition.overrides.solid[0]");
+}
+
+TEST(Overrides, KeptSolidIsTheUnionOfItsRegions) {
+  Overrides o;
+  EXPECT_GT(kept_solid(o)({0, 0, 0}), 1e3F);
+  o.solid = {Box3d{{0, 0, 0}, {2, 2, 2}}, Cylinder{{10, 0, 0}, {10, 0, 8}, 6}};
+  const Shape kept = kept_solid(o);
+  EXPECT_NEAR(kept({1, 1, 1}), -1, 1e-5);
+  EXPECT_NEAR(kept({10, 1, 4}), -2, 1e-5);
+  EXPECT_NEAR(kept({5, 1, 1}), 2, 0.3);  // the cylinder's mantle, the box is 3 away
+}
+
+TEST(Overrides, ACutPartsABarWhereItIsGiven) {
+  Recipe recipe = sturdy();
+  recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};
+  const Outcome out = run(block({60, 20, 20}), recipe);
+  ASSERT_EQ(out.report.parts.size(), 2U);
+  EXPECT_NEAR(out.report.parts[0].volume_mm3, 40 * 400, 0.01 * 40 * 400);
+  EXPECT_NEAR(out.report.parts[1].volume_mm3, 20 * 400, 0.01 * 20 * 400);
+  ASSERT_EQ(out.report.interfaces.size(), 1U);
+  EXPECT_NEAR(out.report.interfaces[0].area_mm2, 400, 8);
+  EXPECT_EQ(out.report.solid.pieces, 1);
+
+  recipe.partition.overrides.cuts[0].point_mm = {200, 0, 0};
+  EXPECT_NE(refusal([&] { (void)run(block({60, 20, 20}), recipe); }).find("overrides.cuts[0]"), std::string::npos);
+}
+
+TEST(Overrides, APartGetsTheInfillItIsGiven) {
+  Recipe recipe = sturdy();
+  recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};
+  recipe.partition.overrides.parts = {{1, PartInfill::Solid}};
+  const Outcome out = run(block({60, 20, 20}), recipe);
+  const auto& parts = out.report.parts;
+  ASSERT_EQ(parts.size(), 2U);
+  EXPECT_EQ(parts[1].infill, "solid");
+  EXPECT_EQ(parts[1].candidates, std::vector<int>{1});
+  EXPECT_NEAR(parts[1].infill_volume_mm3, parts[1].lumen_mm3, 0.02 * parts[1].lumen_mm3);
+  EXPECT_LT(parts[0].infill_volume_mm3, 0.7 * parts[0].lumen_mm3);
+  EXPECT_NE(parts[1].reason.find("as the recipe says"), std::string::npos);
+
+  recipe.partition.overrides.parts = {{7, PartInfill::Solid}};
+  EXPECT_NE(refusal([&] { (void)run(block({60, 20, 20}), recipe); }).find("use 0 to 1"), std::string::npos);
+}
+
+TEST(Overrides, ARegionRoundAHoleStaysSolid) {
+  Recipe recipe = sturdy();
+  recipe.partition.overrides.solid = {Cylinder{{10, 10, -1}, {10, 10, 21}, 8}};
+  const Mesh mesh = block({20, 20, 20});
+  HybridizeParams params{.recipe = recipe, .infill = InfillKind::Tcs, .voxel_mm = 0.5};
+  Report report;
+  const Hybrid made = hybridize(prepare({mesh, 1.0, {}}, {}), params, report);
+  Random random(3, "kept", 0);
+  for (int i = 0; i < 300; ++i) {
+    const double angle = 6.28 * random.uniform(), r = 3.6 * std::sqrt(random.uniform());
+    const Vec3d p{10 + r * std::cos(angle), 10 + r * std::sin(angle), 0.5 + 19 * random.uniform()};
+    EXPECT_LT(made.solid.distance(p), 0.1) << p.x << " " << p.y << " " << p.z;
+  }
+}
+
+// Whatever planes part a box, and whatever fills the parts: one piece, joined at every border.
+TEST(Overrides, RandomPartsOfABoxAreAlwaysOnePiece) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Random random(seed, "planes", 0);
+    const auto unit = [&] { return 2 * random.uniform() - 1; };
+    const Vec3d size{44, 36, 30};
+    Recipe recipe = sturdy();
+    recipe.seed = seed;
+    const int cuts = 1 + static_cast<int>(random.below(3));  // 2 to 8 parts
+    for (int i = 0; i < cuts; ++i) {
+      Vec3d normal{unit(), unit(), unit()};
+      if (norm(normal) < 0.1) normal = {0, 0, 1};
+      const Vec3d point{size.x * (0.5 + 0.2 * unit()), size.y * (0.5 + 0.2 * unit()), size.z * (0.5 + 0.2 * unit())};
+      recipe.partition.overrides.cuts.push_back({point, normal});
+    }
+    for (int id = 0; id <= cuts; ++id)
+      recipe.partition.overrides.parts.push_back({id, static_cast<PartInfill>(random.below(3))});
+    const Report report = run(block(size), recipe).report;
+    const int parts = static_cast<int>(report.parts.size());
+    EXPECT_GT(parts, cuts);
+    EXPECT_EQ(report.solid.pieces, 1) << "seed " << seed;
+    EXPECT_EQ(report.solid.dangling, 0) << "seed " << seed;
+    EXPECT_GE(static_cast<int>(report.interfaces.size()), parts - 1) << "seed " << seed;
+    for (const InterfaceReport& i : report.interfaces) {
+      EXPECT_EQ(i.regions_after, 1) << "seed " << seed << ", parts " << i.a << " and " << i.b;
+      EXPECT_GT(i.contact_area_mm2, 0) << "seed " << seed << ", parts " << i.a << " and " << i.b << ", " << i.area_mm2
+                                       << " mm2";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace fibrolite
