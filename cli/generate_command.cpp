@@ -27,6 +27,7 @@ struct GenerateOptions {
   std::optional<double> voxel_mm;
   InfillKind infill = InfillKind::Hybrid;
   std::optional<fs::path> picture, steps;
+  bool fix = false;
 
   [[nodiscard]] std::vector<fs::path> targets() const {
     std::vector<fs::path> all = output.files;
@@ -72,6 +73,7 @@ void generate(const GenerateOptions& options) {
   params.recipe = options.recipe.load();
   params.infill = options.infill;
   params.steps = options.steps.has_value();
+  params.fix = options.fix;
   params.recipe.verify.up = direction(options.model.up);
   check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
 
@@ -135,6 +137,7 @@ void add_generate_command(CLI::App& program) {
   add_options(command, options->recipe);
   add_file(command, "--picture", options->picture, ".png", "Picture of the solid, cut open");
   add_file(command, "--steps", options->steps, ".vdb", "Every step as a named grid");
+  command.add_flag("--fix", options->fix, "Mend what the print checks find: thin walls, small gaps, closed voids");
   command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");
   add_options(command, options->run);
   command.callback([options] { generate(*options); });

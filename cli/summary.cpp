@@ -72,6 +72,17 @@ std::string strength_table(const std::vector<StrengthReport>& cases) {
   return table(rows) + "\n" + table(weak) + "\n";
 }
 
+std::string print_line(const PrintReport& print, const PrintParams& limits) {
+  if (!print.checked) return {};
+  const Printable& found = print.found;
+  std::string text = "print     " + counted(found.thin_walls.places, "place") + " thinner than ";
+  text += measured(limits.wall_mm) + " mm, " + counted(found.small_gaps.places, "gap") + " below ";
+  text += measured(limits.gap_mm) + " mm, " + share(found.overhangs.area_mm2, found.lumen_mm2);
+  text += " of the faces inside overhang";
+  if (!print.drains.empty()) text += ", " + counted(static_cast<std::int64_t>(print.drains.size()), "drain hole");
+  return text + "\n";
+}
+
 std::string run_line(const Report& report) {
   double wall_s = 0, cpu_s = 0, peak_mb = 0;
   for (const StageReport& stage : report.stages) {
@@ -109,7 +120,7 @@ void print_summary(const Report& report, const std::vector<std::filesystem::path
           counted(solid.cavities, "closed void") + "\n";
   text += "mesh      " + std::to_string(report.mesh.triangles) + " triangles, " +
           (report.mesh.closed() ? "closed" : std::to_string(report.mesh.boundary_edges) + " open edges") + "; voxel " +
-          measured(solid.voxel_mm) + " mm\n";
+          measured(solid.voxel_mm) + " mm\n" + print_line(report.print, report.recipe.print);
   finish(text + run_line(report), report, files);
 }
 

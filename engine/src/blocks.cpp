@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <array>
 
 #include "vdb_access.h"
@@ -57,6 +58,36 @@ void for_each_block(const std::vector<Vec3i>& origins, double voxel_mm,
       visit(i, PointBlock{x.data(), y.data(), z.data(), PointBlock::capacity, &o, voxel_mm});
     }
   });
+}
+
+void copy_samples(const Solid& solid, Vec3i low, Vec3i size, float* out) {
+  const openvdb::FloatTree& tree = solid.impl().grid->tree();
+  const Vec3i end{low.x + size.x, low.y + size.y, low.z + size.z};
+  // A box at a time: what one leaf or tile of the tree shares with the samples.
+  for (int bx = low.x & ~7; bx < end.x; bx += 8) {
+    for (int by = low.y & ~7; by < end.y; by += 8) {
+      for (int bz = low.z & ~7; bz < end.z; bz += 8) {
+        const openvdb::Coord origin(bx, by, bz);
+        const auto* leaf = tree.probeConstLeaf(origin);
+        const float* values = leaf != nullptr ? leaf->buffer().data() : nullptr;
+        const float tile = values != nullptr ? 0 : tree.getValue(origin);
+        const int z0 = std::max(bz, low.z), z1 = std::min(bz + 8, end.z);
+        for (int x = std::max(bx, low.x); x < std::min(bx + 8, end.x); ++x) {
+          for (int y = std::max(by, low.y); y < std::min(by + 8, end.y); ++y) {
+            float* row = out + (static_cast<std::size_t>(x - low.x) * static_cast<std::size_t>(size.y) +
+                                static_cast<std::size_t>(y - low.y)) *
+                                   static_cast<std::size_t>(size.z);
+            if (values != nullptr) {
+              const float* from = values + 64 * (x - bx) + 8 * (y - by);
+              std::copy(from + (z0 - bz), from + (z1 - bz), row + (z0 - low.z));
+            } else {
+              std::fill(row + (z0 - low.z), row + (z1 - low.z), tile);
+            }
+          }
+        }
+      }
+    }
+  }
 }
 
 }  // namespace fibrolite

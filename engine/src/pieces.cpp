@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <queue>
@@ -309,6 +310,35 @@ Pieces pieces(const Solid& solid, const Context& context) {
   const Components components(solid, context);
   if (components.empty()) return {};
   return summarize(components.list(), solid.grid().voxel_mm);
+}
+
+struct VoidMap::Impl {
+  Impl(const Solid& solid, const Context& context) : components(solid, context) {
+    if (components.empty()) return;
+    std::vector<Components::Component> voids;
+    const auto list = components.list();
+    std::copy_if(list.begin() + 1, list.end(), std::back_inserter(voids), [](const auto& c) { return !c.inside; });
+    std::stable_sort(voids.begin(), voids.end(), [](const auto& a, const auto& b) { return a.voxels > b.voxels; });
+    for (const Components::Component& c : voids) number.emplace_back(c.id, static_cast<int>(number.size()) + 1);
+    std::sort(number.begin(), number.end());
+    voids.insert(voids.begin(), list.front());  // where summarize() expects the exterior
+    cavities = summarize(voids, solid.grid().voxel_mm).cavities;
+  }
+
+  Components components;
+  std::vector<Piece> cavities;
+  std::vector<std::pair<Id, int>> number;  // of each cavity, by its id
+};
+
+VoidMap::VoidMap(const Solid& solid, const Context& context) : impl_(std::make_shared<const Impl>(solid, context)) {}
+const std::vector<Piece>& VoidMap::cavities() const { return impl_->cavities; }
+int VoidMap::at(Vec3i sample) const {
+  const openvdb::Coord at(sample.x, sample.y, sample.z);
+  if (impl_->components.empty()) return outside;
+  if (impl_->components.inside(at)) return material;
+  const Id id = impl_->components.at(at);
+  const auto found = std::lower_bound(impl_->number.begin(), impl_->number.end(), std::pair(id, 0));
+  return found != impl_->number.end() && found->first == id ? found->second : outside;
 }
 
 CleanResult clean(const Solid& solid, const CleanParams& params, const Context& context) {

@@ -80,22 +80,25 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
     return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()}, c);
   });
-  out.solid = tied.solid;
+  const Mended mended = run("print checks", 0.97, [&](const Context& c) {
+    return checked_and_mended(tied, body, fills, recipe, params.fix, report, c);
+  });
+  out.solid = mended.tied.solid;
 
   run("measure", 1.0, [&](const Context& c) {
     std::vector<Shape> regions;
     for (const Part& part : out.parts.parts) regions.push_back(part.region());
     report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
     report_joints(out.interfaces, out.joints, demand_n, recipe, report);
-    report_solid(tied, body, recipe.material, report);
+    report_solid(mended.tied, body, recipe.material, report);
     report_weak_places(out.parts, fills, body, out.solid, recipe, params.infill, report, c);
   });
   if (params.function) {
     const Shape smooth =
         compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, recipe, assembly);
-    out.printed = as_function(smooth, body, tied);
+    out.printed = as_function(smooth, body, mended);
   }
-  if (params.steps) out.steps = steps(body, raw, out, fills, tied.struts, assembly);
+  if (params.steps) out.steps = steps(body, raw, out, fills, mended, assembly);
   return out;
 }
 

@@ -152,6 +152,12 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
   if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);
 
+  const double drain_mm = recipe.print.drain_mm.value_or(0);
+  if (drain_mm > 0 && drain_mm < 2 * voxel_mm * (1 - 1e-9))
+    unfit("print.drain_mm is " + number_text(drain_mm) + " mm, narrower than 2 voxels",
+          "voxel " + number_text(voxel_mm) + " mm",
+          "use " + number_text(2 * voxel_mm) + " or more, or a smaller --voxel");
+
   constexpr double rounding = 1 - 1e-9;  // 0.8 mm at a voxel of 0.4 mm is two voxels, whatever the last bit says
   for (const Feature& feature : features(recipe, infill))
     if (feature.mm < 2 * voxel_mm * rounding)

@@ -258,6 +258,15 @@ const std::vector<Field>& table() {
       field("joint.min_wall_mm", &R::joint, &JointParams::min_wall_mm, {0.01, 1000},
             "width of a bridge; 2 voxels or more"),
 
+      field("print.wall_mm", &R::print, &PrintParams::wall_mm, {0.01, 1000},
+            "walls and sticks thinner than this are reported, and thickened with --fix"),
+      field("print.gap_mm", &R::print, &PrintParams::gap_mm, {0.01, 1000},
+            "gaps inside narrower than this are reported, and closed with --fix"),
+      field("print.overhang_deg", &R::print, &PrintParams::overhang_deg, {0, 90},
+            "faces inside that lean more than this from upright are reported; 90 is a ceiling"),
+      field("print.drain_mm", &R::print, &PrintParams::drain_mm, {0, 1000},
+            "diameter of a hole in every closed void, 2 voxels or more; 0: none; auto: none, with --fix 2 mm"),
+
       field("material.density_g_cm3", &R::material, &Material::density_g_cm3, {0, 30, true}, "density"),
       field("material.young_mpa", &R::material, &Material::young_mpa, {0, huge, true}, "Young's modulus"),
       field("material.poisson", &R::material, &Material::poisson, {0, 0.49}, "Poisson's ratio"),

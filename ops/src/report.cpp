@@ -134,6 +134,37 @@ Json to_json(const StrengthReport& s) {
           {"residual", s.residual}};
 }
 
+Json to_json(const PrintPlace& place) {
+  return {{"at_mm", list(place.at_mm)}, {"mm", place.mm}, {"area_mm2", place.area_mm2}};
+}
+
+Json to_json(const PrintFault& fault) {
+  return {{"places", fault.places},
+          {"area_mm2", fault.area_mm2},
+          {"volume_mm3", fault.volume_mm3},
+          {"least_mm", fault.least_mm},
+          {"worst", array(fault.worst)}};
+}
+
+Json to_json(const Drain& drain) {
+  return {{"place_mm", list(drain.place_mm)},
+          {"direction", list(drain.direction)},
+          {"diameter_mm", 2 * drain.shape.radius_mm},
+          {"length_mm", drain.length_mm},
+          {"outward", drain.outward}};
+}
+
+Json to_json(const PrintReport& print) {
+  Json overhangs = to_json(print.found.overhangs);
+  overhangs["nodes_mm2"] = print.found.node_overhang_mm2;
+  overhangs["lumen_mm2"] = print.found.lumen_mm2;
+  return {{"thin_walls", to_json(print.found.thin_walls)},
+          {"small_gaps", to_json(print.found.small_gaps)},
+          {"overhangs", overhangs},
+          {"drains", array(print.drains)},
+          {"mended", {{"balls", print.thickened}, {"voids_filled", print.voids_filled}}}};
+}
+
 Json to_json(const PlateReport& plate) {
   return {{"name", plate.name},
           {"layers", plate.layers},
@@ -218,6 +249,7 @@ std::string to_json(const Report& report) {
       {"threads", report.threads},
       {"stages", array(report.stages)},
       {"warnings", report.warnings}};
+  if (report.print.checked) json["print"] = to_json(report.print);
   if (!report.slices.empty()) {
     json["slices"] = {{"volume_mm3", report.sliced_mm3()}, {"plates", array(report.slices)}};
   }

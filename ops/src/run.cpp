@@ -80,9 +80,30 @@ Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fi
   return assemble(body, filled, shapes, params);
 }
 
-Shape as_function(const Shape& whole, const Solid& body, const Tied& tied) {
-  const Shape b = distance_to(body), solid = distance_to(tied.solid);
-  const Shape made = tied.struts.empty() ? whole : unite({whole, intersect({b, capsules(tied.struts)})});
+Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills, const Recipe& recipe,
+                          bool fix, Report& report, const Context& context) {
+  const PrintParams& limits = recipe.print;
+  const double voxel = body.grid().voxel_mm, shell_mm = recipe.shell.thickness_mm;
+  const TieParams ties{.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
+  const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
+  Mended out{tied, {}, {}, 0};
+  if (fix || drain_mm > 0) {
+    out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
+  }
+  double node_mm = 2 * limits.wall_mm;
+  for (const Fill& fill : fills) node_mm = std::max(node_mm, fill.ball_mm);
+  const Shape lumen = offset(distance_to(body), -0.5 * shell_mm);
+  report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm, context);
+  report.print.checked = true;
+  report.print.drains = out.drains;
+  report.print.thickened = static_cast<std::int64_t>(out.thickened.size());
+  report.print.voids_filled = out.voids_filled;
+  return out;
+}
+
+Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
+  const Shape b = distance_to(body), solid = distance_to(mended.tied.solid);
+  const Shape made = with_mends(whole, b, mended);
 
   // Samples on which function and solid differ: a ball about each, which covers the cells around it.
   struct Differing {
@@ -114,7 +135,7 @@ Shape as_function(const Shape& whole, const Solid& body, const Tied& tied) {
 }
 
 std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made, const std::vector<Fill>& fills,
-                              const std::vector<Capsule>& struts, const AssembleParams& params) {
+                              const Mended& mended, const AssembleParams& params) {
   const Shape b = distance_to(body);
   std::vector<NamedSolid> result;
   const auto add = [&](const std::string& name, const Shape& shape) {
@@ -126,9 +147,11 @@ std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid&
     add("fill_" + std::to_string(i), clip({made.parts.parts[i].region(), fills[i].shape}, params));
   }
   for (std::size_t i = 0; i < made.joints.size(); ++i) add("joint_" + std::to_string(i), made.joints[i].shape);
-  if (!struts.empty()) add("ties", capsules(struts));
-  // What mending changed: material that went, void that was filled.
-  const Shape before = struts.empty() ? distance_to(raw) : unite({distance_to(raw), intersect({b, capsules(struts)})});
+  if (!mended.tied.struts.empty()) add("ties", capsules(mended.tied.struts));
+  if (!mended.thickened.empty()) add("thickened", capsules(mended.thickened));
+  if (!mended.drains.empty()) add("drains", capsules(shapes(mended.drains)));
+  // What cleaning changed: material that went, void that was filled.
+  const Shape before = with_mends(distance_to(raw), b, mended);
   const Shape after = distance_to(made.solid);
   for (const auto& [name, change] :
        {std::pair("specks", subtract(before, after)), std::pair("pores", subtract(after, before))}) {

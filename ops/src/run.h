@@ -11,6 +11,7 @@
 #include "fibrolite/ops/fill.h"
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/measure.h"
+#include "fibrolite/ops/mend.h"
 #include "fibrolite/ops/tie.h"
 
 namespace fibrolite {
@@ -51,12 +52,15 @@ class Run {
 [[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
                             const std::vector<Joint>& joints, InfillKind infill, const Recipe& recipe,
                             const AssembleParams& params);
-/// The printed solid as a function: the composed shape with its ties, mended wherever a sample of the solid says
-/// otherwise (specks that went, pores that were filled).
-[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Tied& tied);
+/// The printed solid as a function: the composed shape with its ties and mends, put right wherever a sample of the
+/// solid says otherwise (specks that went, pores that were filled).
+[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made);
+/// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
+[[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
+                                        const Recipe& recipe, bool fix, Report& report, const Context& context);
 /// Every step as a grid of its own (see Hybrid::steps).
 [[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
-                                            const std::vector<Fill>& fills, const std::vector<Capsule>& struts,
+                                            const std::vector<Fill>& fills, const Mended& mended,
                                             const AssembleParams& params);
 
 void report_decisions(const Partition& partition, const Verification& verification, Report& report);

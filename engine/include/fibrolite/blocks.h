@@ -18,4 +18,9 @@ namespace fibrolite {
 void for_each_block(const std::vector<Vec3i>& origins, double voxel_mm,
                     const std::function<void(std::size_t number, const PointBlock& block)>& visit);
 
+/// The samples low + (i, j, k), each index below `size`, as one dense array, k (z) fastest: out[(i * size.y + j) *
+/// size.z
+/// + k], distance in mm. `out` holds size.x * size.y * size.z values. Cost: O(samples).
+void copy_samples(const Solid& solid, Vec3i low, Vec3i size, float* out);
+
 }  // namespace fibrolite

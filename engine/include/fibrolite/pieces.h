@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "fibrolite/context.h"
@@ -23,6 +24,22 @@ struct Pieces {
 };
 /// Cost: O(leaves + active voxels), parallel; the same bits on any number of threads.
 [[nodiscard]] Pieces pieces(const Solid& solid, const Context& context = {});
+
+/// Which void a sample lies in. Immutable; copies are cheap.
+class VoidMap {
+ public:
+  static constexpr int material = -1, outside = 0;
+  /// Cost: as pieces().
+  explicit VoidMap(const Solid& solid, const Context& context = {});
+  /// Of sample (i, j, k), at voxel * (i, j, k): material, outside, or 1 + its place in cavities(). Cost: O(log
+  /// cavities).
+  [[nodiscard]] int at(Vec3i sample) const;
+  [[nodiscard]] const std::vector<Piece>& cavities() const;  ///< As in Pieces.
+
+ private:
+  struct Impl;
+  std::shared_ptr<const Impl> impl_;
+};
 
 struct CleanParams {
   std::int64_t drop_below_vox = 32;  ///< Loose pieces smaller than this are removed.

@@ -23,6 +23,7 @@ struct HybridizeParams {
   Recipe recipe;
   InfillKind infill = InfillKind::Hybrid;
   std::optional<double> voxel_mm;  ///< Default: min(longest side / 400, thinnest feature / 3).
+  bool fix = false;                ///< Mend what the print checks find (mend.h).
   bool steps = false;              ///< Also realize every step as a grid of its own.
   bool function = false;           ///< Also give the solid as a distance function (Hybrid::printed).
 };
@@ -32,8 +33,8 @@ struct Hybrid {
   Labels candidates;  ///< Of the partition, before touching bulk became one part; of other infills: one.
   std::vector<Interface> interfaces;
   std::vector<Joint> joints;
-  /// If asked for: body, shell, fill_<part>, joint_<n>, ties, specks (removed), pores (filled), solid. The union of
-  /// shell, fills, joints, ties and pores less the specks is the solid.
+  /// If asked for: body, shell, fill_<part>, joint_<n>, ties, thickened, drains (holes), specks (removed), pores
+  /// (filled), solid. The union of shell, fills, joints, ties, thickened and pores less drains and specks is the solid.
   std::vector<NamedSolid> steps;
   Shape body;  ///< Distance to the model, as far in as the shell goes.
   /// If asked for: the solid as a function, sharper than its voxels: body, shell, fills, joints and ties as composed,

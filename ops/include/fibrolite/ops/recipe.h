@@ -17,6 +17,7 @@
 #include "fibrolite/ops/loads.h"
 #include "fibrolite/ops/material.h"
 #include "fibrolite/ops/partition.h"
+#include "fibrolite/ops/printable.h"
 #include "fibrolite/ops/verify.h"
 
 namespace fibrolite {
@@ -31,6 +32,7 @@ struct Recipe {
   MfsParams mfs;  ///< Its seed follows `seed`.
   TcsParams tcs;
   JointParams joint;
+  PrintParams print;
   Material material;
   std::uint64_t seed = 1;
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fibrolite/mesh.h"
+#include "fibrolite/ops/mend.h"
 #include "fibrolite/ops/recipe.h"
 
 namespace fibrolite {
@@ -89,6 +90,14 @@ struct StrengthReport {
   int iterations = 0;
   double residual = 0;
 };
+/// What the print checks found on the finished solid, and what was mended before.
+struct PrintReport {
+  bool checked = false;
+  Printable found;
+  std::vector<Drain> drains;
+  std::int64_t thickened = 0;     ///< Balls put into thin walls and small gaps.
+  std::int64_t voids_filled = 0;  ///< Enclosed, too small for a hole.
+};
 /// The layers of one plate.
 struct PlateReport {
   std::string name;
@@ -110,6 +119,7 @@ struct Report {
   std::vector<PartReport> parts;
   std::vector<InterfaceReport> interfaces;
   SolidReport solid;
+  PrintReport print;  ///< Left out of the JSON if nothing was checked.
   MeshCheck mesh;
   std::vector<StrengthReport> strength;  ///< Empty if it was not asked for.
   std::vector<PlateReport> slices;       ///< Empty if nothing was sliced; then the report has no such key.

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/mend.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+#include <utility>
+
+#include "fibrolite/realize.h"
+#include "print_limits.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr int rounds = 3;  // what is mended can make a new gap, or a new void
+
+/// A ball in the middle of each wall or gap, one per voxel.
+void add_balls(const std::vector<Spot>& spots, bool wall, double wall_mm, double voxel_mm,
+               std::vector<Capsule>& balls) {
+  std::vector<std::pair<std::tuple<long, long, long>, Capsule>> found;
+  for (const Spot& spot : spots) {
+    const Vec3d middle = spot.foot_mm + (wall ? -0.5 : 0.5) * spot.mm * spot.normal;
+    const double radius = wall ? 0.5 * wall_mm : 0.5 * spot.mm + 0.75 * voxel_mm;
+    const auto cell = [&](double v) { return std::lround(v / voxel_mm); };
+    found.push_back({{cell(middle.x), cell(middle.y), cell(middle.z)}, {middle, middle, radius}});
+  }
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (i == 0 || found[i].first != found[i - 1].first) balls.push_back(found[i].second);
+  }
+}
+
+/// The tied solid, changed to `solid` and made one piece again.
+void take(Tied& tied, const Solid& solid, const Solid& body, const TieParams& params, const Context& context) {
+  const Tied now = tie(solid, distance_to(solid), body, params, context);
+  tied.solid = now.solid;
+  tied.left = now.left;
+  tied.dropped += now.dropped;
+  tied.filled += now.filled;
+  tied.struts.insert(tied.struts.end(), now.struts.begin(), now.struts.end());
+}
+
+}  // namespace
+
+Shape with_mends(const Shape& whole, const Shape& body, const Mended& m) {
+  Shape result = whole;
+  if (!m.tied.struts.empty()) result = unite({result, intersect({body, capsules(m.tied.struts)})});
+  if (!m.thickened.empty()) result = unite({result, intersect({body, capsules(m.thickened)})});
+  if (!m.drains.empty()) result = subtract(result, capsules(shapes(m.drains)));
+  return result;
+}
+
+Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const Context& context) {
+  Mended out{tied, {}, {}, 0};
+  const double voxel = body.grid().voxel_mm;
+  const Shape b = distance_to(body), lumen = offset(b, -0.5 * params.shell_mm);
+  for (int round = 0; params.walls_and_gaps && round < rounds; ++round) {
+    const Scan found = print_scan(out.tied.solid, lumen, params.print, params.up, context);
+    std::vector<Capsule> balls;
+    add_balls(found.walls, true, params.print.wall_mm, voxel, balls);
+    add_balls(found.gaps, false, params.print.wall_mm, voxel, balls);
+    if (balls.empty()) break;
+    const Shape thicker = unite({distance_to(out.tied.solid), intersect({b, capsules(balls)})});
+    take(out.tied, realize(thicker, body, context), body, params.tie, context);
+    out.thickened.insert(out.thickened.end(), balls.begin(), balls.end());
+  }
+  if (params.drain_mm == 0) return out;
+  const double ball_vox = std::numbers::pi / 6 * std::pow(params.drain_mm / voxel, 3);
+  const CleanResult filled =
+      clean(out.tied.solid, {.drop_below_vox = 0, .fill_below_vox = std::lround(ball_vox)}, context);
+  out.tied.solid = filled.solid;
+  out.tied.left = filled.left;
+  out.voids_filled = filled.filled;
+  for (int round = 0; round < rounds && !out.tied.left.cavities.empty(); ++round) {
+    const auto holes =
+        drains(out.tied.solid, {.hole_mm = params.drain_mm, .up = params.up, .reach_mm = 4 * params.shell_mm}, context);
+    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(shapes(holes)));
+    take(out.tied, realize(drilled, body, context), body, params.tie, context);
+    out.drains.insert(out.drains.end(), holes.begin(), holes.end());
+  }
+  return out;
+}
+
+}  // namespace fibrolite

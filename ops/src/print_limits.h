@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The recipe's print limits as a scan, with their tolerances.
+#pragma once
+
+#include "fibrolite/ops/printable.h"
+#include "print_scan.h"
+
+namespace fibrolite {
+
+/// What is too thin, too narrow or too steep, without what is too small to be a place: less than four squares of a
+/// voxel, and of gaps less than two squares (one on either face) of twice the gap. That is a crevice beside a contact,
+/// which prints as a fillet. @throws Error BadRecipe: a range of PrintParams.
+[[nodiscard]] Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up,
+                              const Context& context);
+
+}  // namespace fibrolite
