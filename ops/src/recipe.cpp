@@ -108,7 +108,7 @@ void check_tcs(const TcsParams& given) {
 }
 
 void check_mfs(const MfsParams& mfs) {
-  const double least = least_fibre_mm(mfs.wall_mm, mfs.walls);
+  const double least = least_fibre_mm(mfs.wall_mm, mfs.gap_mm, mfs.walls);
   if (mfs.fibre_mm <= least)
     unfit("mfs.fibre_mm is " + number_text(mfs.fibre_mm) + ", no room for a void between walls of " +
               number_text(mfs.wall_mm) + " mm",

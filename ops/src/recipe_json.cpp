@@ -215,10 +215,15 @@ const std::vector<Field>& table() {
             "resolve stress along x, y, z as in the paper, not along each part's axis"),
 
       field("mfs.fibre_mm", &R::mfs, &MfsParams::fibre_mm, {0.02, 1000},
-            "mean distance between fibre centres; more than 2 * mfs.wall_mm"),
+            "mean distance between fibre centres; more than 2 * mfs.wall_mm, and mfs.wall_mm + mfs.gap_mm (delaunay: "
+            "twice that)"),
       field("mfs.wall_mm", &R::mfs, &MfsParams::wall_mm, {0.01, 1000}, "least membrane thickness; 2 voxels or more"),
+      field("mfs.gap_mm", &R::mfs, &MfsParams::gap_mm, {0.01, 1000},
+            "least width of a void between membranes; what is narrower becomes membrane"),
       field("mfs.walls", &R::mfs, &MfsParams::walls,
             "image: membranes as synthesised; delaunay: triangles between the same fibres, stiff across"),
+      field("mfs.taper", &R::mfs, &MfsParams::taper,
+            "fibres converge where the limb narrows and spread where it widens; membranes keep their thickness"),
       field("mfs.template", &R::mfs, &MfsParams::micrograph, "micrograph that the fibres are taken from"),
 
       field("tcs.form", &R::tcs, &TcsParams::form,

@@ -37,6 +37,22 @@ Json to_json(const CaseStress& c) {
           {"principal_direction", list(c.principal_direction)}};
 }
 
+/// null where there are no fibres.
+Json fibres_of(const PartReport& part) {
+  if (part.fibres == 0) return nullptr;
+  const FibreCensus &section = part.section, &micrograph = part.micrograph;
+  return {{"template",
+           {{"fibres", micrograph.fibres},
+            {"mean_area_px2", micrograph.mean_area},
+            {"membrane_px", micrograph.membrane},
+            {"porosity", micrograph.porosity}}},
+          {"section",
+           {{"fibres", section.fibres},
+            {"mean_area_mm2", section.mean_area},
+            {"membrane_mm", section.membrane},
+            {"porosity", section.porosity}}}};
+}
+
 Json to_json(const PartReport& part) {
   const Json stress = {{"axial", part.stress.axial},
                        {"transverse", {part.stress.transverse[0], part.stress.transverse[1]}},
@@ -50,6 +66,7 @@ Json to_json(const PartReport& part) {
           {"lumen_mm3", part.lumen_mm3},
           {"infill_volume_mm3", part.infill_volume_mm3},
           {"fibres", part.fibres},
+          {"mfs", fibres_of(part)},
           {"centroid_mm", list(part.centroid_mm)},
           {"axis", list(part.axis)},
           {"diameter_mm", part.diameter_mm},

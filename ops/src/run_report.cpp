@@ -40,6 +40,8 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
     row.lumen_mm3 = volumes[i].lumen_mm3;
     row.infill_volume_mm3 = volumes[i].infill_mm3;
     row.fibres = fills[i].fibres;
+    row.section = fills[i].section;
+    row.micrograph = fills[i].micrograph;
     row.centroid_mm = volumes[i].centroid_mm;
     row.axis = part.axis().mean();
     row.diameter_mm = part.diameter_mm();

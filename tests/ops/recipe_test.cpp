@@ -369,6 +369,8 @@ TEST(CheckRecipe, NumbersMustFitEachOther) {
   EXPECT_EQ(refused("tcs.ball_mm=0.8"), "");
   EXPECT_THAT(refused("mfs.fibre_mm=1.6"), HasSubstr("mfs.fibre_mm"));
   EXPECT_EQ(refused("mfs.fibre_mm=1.61"), "");
+  EXPECT_THAT(refused("mfs.gap_mm=1.6"), HasSubstr("mfs.fibre_mm"));
+  EXPECT_EQ(refused("mfs.gap_mm=1.5"), "");
   EXPECT_THAT(refused("joint.spacing_mm=0.8"), HasSubstr("joint.spacing_mm"));
 }
 

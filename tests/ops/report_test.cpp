@@ -28,6 +28,8 @@ Report filled() {
   part.volume_mm3 = 10;
   part.infill_volume_mm3 = 4;
   part.fibres = 19;
+  part.section = {19, 3.5, 0.81, 0.5};
+  part.micrograph = {724, 978, 5, 0.7};
   part.centroid_mm = {1, 2, 3};
   part.axis = {0, 0, 1};
   part.stress = {-5, {0.5, 0.25}, 5.5, 10, {}};
@@ -78,6 +80,10 @@ TEST(Report, ShapesOfValues) {
   EXPECT_EQ(report["model"]["repairs"], json({"turned inside out"}));
   EXPECT_EQ(report["parts"][0]["mean_stress_mpa"]["axial"], -5.0);
   EXPECT_EQ(report["parts"][0]["mean_stress_mpa"]["transverse"], json({0.5, 0.25}));
+  EXPECT_EQ(report["parts"][0]["mfs"]["section"],
+            json({{"fibres", 19}, {"mean_area_mm2", 3.5}, {"membrane_mm", 0.81}, {"porosity", 0.5}}));
+  EXPECT_EQ(report["parts"][0]["mfs"]["template"],
+            json({{"fibres", 724}, {"mean_area_px2", 978.0}, {"membrane_px", 5.0}, {"porosity", 0.7}}));
   EXPECT_EQ(report["interfaces"][0]["parts"], json({3, 0}));
   EXPECT_EQ(report["verification"]["selected"][0]["case"], "pressed");
   EXPECT_EQ(report["verification"]["selected"][0]["area_mm2"], 12.5);

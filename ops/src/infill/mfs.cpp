@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <memory>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -13,55 +13,18 @@
 
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
+#include "infill/census.h"
 #include "infill/sweep.h"
+#include "infill/taper.h"
 #include "plane_image.h"
 
 namespace fibrolite {
 namespace {
 
 constexpr int section_side_px = 160;  // at most, for measuring a lumen
-
-class Membranes final : public Shape::Function {
- public:
-  Membranes(MembraneImage image, const Axis& axis, Vec2d center_mm) : image_(std::move(image)), sweep_(axis) {
-    per_pixel_ = static_cast<float>(1 / image_.pixel_mm);
-    corner_x_ = static_cast<float>(center_mm.x - 0.5 * (image_.distance_mm.width - 1) * image_.pixel_mm);
-    corner_y_ = static_cast<float>(center_mm.y - 0.5 * (image_.distance_mm.height - 1) * image_.pixel_mm);
-    const auto [lo, hi] = std::minmax_element(image_.distance_mm.pixels.begin(), image_.distance_mm.pixels.end());
-    range_ = {*lo, *hi};
-    const double reach = 0.5 * std::hypot(image_.width_mm(), image_.height_mm()) + norm(center_mm);
-    sweep_lipschitz_ = 1.02 * std::hypot(1, reach * sweep_.twist_per_mm());
-  }
-
-  void evaluate(const PointBlock& block, float* out) const override {
-    std::array<float, PointBlock::capacity> u, v;
-    sweep_.map(block, u.data(), v.data());
-    for (int i = 0; i < block.count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      out[i] = bilinear(image_.distance_mm, (u[k] - corner_x_) * per_pixel_, (v[k] - corner_y_) * per_pixel_);
-    }
-  }
-
-  /// The samples and the sweep are 1-Lipschitz; what bilinear values add to that is below 1.5 pixels (each is a mean of
-  /// samples at most 0.71 pixel away, at both ends).
-  [[nodiscard]] Interval bound(const Box3d& box) const override {
-    const Vec3f c = to_float(box.center());
-    float value = 0;
-    evaluate({&c.x, &c.y, &c.z, 1}, &value);
-    const auto reach = static_cast<float>(sweep_lipschitz_ * 0.5 * norm(box.size()) + 1.5 * image_.pixel_mm);
-    return {std::max(range_.lo, value - reach), std::min(range_.hi, value + reach)};
-  }
-
-  /// Between the samples of a 1-Lipschitz image the bilinear slope is at most 1 along each axis, so sqrt(2).
-  [[nodiscard]] double lipschitz() const override { return sweep_lipschitz_ * std::sqrt(2.0); }
-
- private:
-  MembraneImage image_;
-  Sweep sweep_;
-  double sweep_lipschitz_ = 1.02;  // 1 along a smooth line; stations of 0.08 rad add less than this
-  float per_pixel_ = 1, corner_x_ = 0, corner_y_ = 0;
-  Interval range_{0, 0};
-};
+constexpr int limb_side_px = 64;      // for measuring a limb along its line, at
+constexpr int taper_sections = 49;    // of these
+constexpr double most_taper = 1.25;   // fibres get this much wider or narrower than in the limb's middle, or less
 
 struct Extent {
   Vec2d min{1e30, 1e30}, max{-1e30, -1e30};
@@ -126,67 +89,78 @@ LumenSection lumen_section(const Shape& lumen, const Frame& frame, const Extent&
   return section;
 }
 
-/// Membranes that end in a void: a circle about the end of one, wider than the membrane, meets material once and over
-/// less than half its length; about a wall it meets material twice, about a junction three times or more.
-int count_free_edges(const FloatImage& wall, const FloatImage& lumen, double wall_mm, double pixel_mm) {
-  constexpr int probes = 48;
-  constexpr double wider = 1.3, most = 0.4;
-  Image<std::uint8_t> ends(wall.width, wall.height);
-  for (int j = 0; j < wall.height; ++j)
-    for (int i = 0; i < wall.width; ++i) {
-      const auto depth = static_cast<double>(-wall(i, j));
-      if (depth < 0.4 * wall_mm || static_cast<double>(lumen(i, j)) > -wider * depth) continue;
-      const double radius_px = wider * depth / pixel_mm;
-      int material = 0, starts = 0;
-      bool before = true;
-      for (int k = 0; k <= probes; ++k) {
-        const double turn = 2 * std::numbers::pi * k / probes;
-        const float v = bilinear(wall, static_cast<float>(i + radius_px * std::cos(turn)),
-                                 static_cast<float>(j + radius_px * std::sin(turn)));
-        const bool now = v < 0;
-        if (k > 0) {
-          material += now ? 1 : 0;
-          starts += now && !before ? 1 : 0;
-        }
-        before = now;
-      }
-      ends(i, j) = starts == 1 && material < most * probes;
-    }
-  return regions_of(ends).count;
-}
-
-struct SectionCount {
-  int fibres = 0, free_edges = 0;
+/// The middle section at the resolution of the membranes: their distance, and how far inside the lumen.
+struct FineSection {
+  FloatImage membranes, lumen;
 };
 
-/// Voids inside the lumen of a section, by connected regions of the membrane image itself.
-SectionCount count_fibres(const LumenSection& section, const Shape& membranes, double wall_mm, double pixel_mm) {
+FineSection fine_section(const LumenSection& section, const Shape& membranes, double pixel_mm) {
   PlaneGrid fine = section.grid;
   const double zoom = fine.pixel_mm / pixel_mm;
   fine.pixel_mm = pixel_mm;
   fine.width = static_cast<int>((section.grid.width - 1) * zoom) + 1;
   fine.height = static_cast<int>((section.grid.height - 1) * zoom) + 1;
-  const FloatImage wall = sample(membranes, fine);
-  Image<std::uint8_t> voids(fine.width, fine.height);
-  FloatImage lumen(fine.width, fine.height);
+  FineSection result{sample(membranes, fine), FloatImage(fine.width, fine.height)};
   for (int j = 0; j < fine.height; ++j)
-    for (int i = 0; i < fine.width; ++i) {
-      lumen(i, j) = bilinear(section.value, static_cast<float>(i / zoom), static_cast<float>(j / zoom));
-      voids(i, j) = lumen(i, j) < 0 && wall(i, j) > 0;
+    for (int i = 0; i < fine.width; ++i)
+      result.lumen(i, j) = bilinear(section.value, static_cast<float>(i / zoom), static_cast<float>(j / zoom));
+  return result;
+}
+
+/// The limb in the normal plane at a share of the line's length.
+LimbSection limb_section(const Shape& body, const Shape& region, const Frame& frame, const Extent& extent) {
+  const Vec2d size = extent.max - extent.min;
+  PlaneGrid grid{frame, extent.min, std::max(size.x, size.y) / (limb_side_px - 1)};
+  grid.width = static_cast<int>(std::ceil(size.x / grid.pixel_mm)) + 1;
+  grid.height = static_cast<int>(std::ceil(size.y / grid.pixel_mm)) + 1;
+  const FloatImage of_body = sample(body, grid), of_part = sample(region, grid);
+  Image<std::uint8_t> mask(grid.width, grid.height);
+  for (std::size_t i = 0; i < mask.pixels.size(); ++i) mask.pixels[i] = of_body.pixels[i] < 0;
+  // The piece nearest to the centre line: the same plane may meet the body again elsewhere.
+  const Regions pieces = regions_of(mask);
+  int piece = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i)
+      if (const double off = norm(grid.local(i, j)); pieces.label(i, j) > 0 && off < nearest) {
+        nearest = off;
+        piece = pieces.label(i, j);
+      }
+  LimbSection result;
+  if (piece == 0) return result;
+  std::int64_t pixels = 0;
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i) {
+      if (pieces.label(i, j) != piece) continue;
+      if (of_part(i, j) >= 0) return {};
+      ++pixels;
+      result.reach_mm = std::max(result.reach_mm, norm(grid.local(i, j)));
     }
-  const Regions found = regions_of(voids);
-  const double least_px = wall_mm * wall_mm / 4 / (pixel_mm * pixel_mm);  // slits at the shell are no fibres
-  const auto fibres = std::count_if(found.pixels.begin(), found.pixels.end(),
-                                    [&](std::int64_t n) { return static_cast<double>(n) >= least_px; });
-  return {static_cast<int>(fibres), count_free_edges(wall, lumen, wall_mm, pixel_mm)};
+  result.size_mm = grid.pixel_mm * std::sqrt(static_cast<double>(pixels) / std::numbers::pi);
+  return result;
+}
+
+/// Fibres converge with the limb as far as they stay wide enough.
+Taper limb_taper(const Part& part, const MfsParams& params, const Shape& body, const Sweep& across,
+                 const Extent& extent) {
+  TaperLimits limits;
+  limits.least = std::min(1.0, std::max(1 / most_taper, 1.2 * least_fibre_mm(params.wall_mm, params.gap_mm,
+                                                                             params.walls) / params.fibre_mm));
+  limits.most = most_taper;
+  std::vector<LimbSection> sections;
+  for (int k = 0; k < taper_sections; ++k)
+    sections.push_back(limb_section(body, part.region(), across.frame_at(k / (taper_sections - 1.0)), extent));
+  return taper_along(across, sections, limits);
 }
 
 void check(const MfsParams& p) {
   if (!(p.wall_mm > 0) || !std::isfinite(p.wall_mm))
     throw Error(Code::BadRecipe, "the membrane must have a thickness above zero", "mfs.wall_mm", "try 0.8");
-  if (!(p.fibre_mm > least_fibre_mm(p.wall_mm, p.walls)) || !std::isfinite(p.fibre_mm))
-    throw Error(Code::BadRecipe, "a fibre must be wider than two membranes", "mfs.fibre_mm",
-                "raise fibre_mm or lower wall_mm");
+  if (!(p.gap_mm > 0) || !std::isfinite(p.gap_mm))
+    throw Error(Code::BadRecipe, "the narrowest void must have a width above zero", "mfs.gap_mm", "try 0.4");
+  if (!(p.fibre_mm > least_fibre_mm(p.wall_mm, p.gap_mm, p.walls)) || !std::isfinite(p.fibre_mm))
+    throw Error(Code::BadRecipe, "a fibre must be wider than two membranes, and than a membrane and a gap",
+                "mfs.fibre_mm", "raise fibre_mm, or lower wall_mm or gap_mm");
 }
 
 std::string mm(double value) {
@@ -197,13 +171,9 @@ std::string mm(double value) {
 
 }  // namespace
 
-Shape sweep(MembraneImage image, const Axis& axis, Vec2d center_mm) {
-  return Shape(std::make_shared<Membranes>(std::move(image), axis, center_mm));
-}
-
 Fill generate(const Part& part, const MfsParams& params, const Shape& body, double shell_mm) {
   check(params);
-  const double pixel_mm = std::min(params.wall_mm / 4, 0.1);
+  const double pixel_mm = std::min({params.wall_mm / 4, params.gap_mm / 4, 0.1});
   const Sweep across(part.axis());
   const Extent extent = extent_across(part, intersect({body, part.region()}), across);
 
@@ -222,20 +192,32 @@ Fill generate(const Part& part, const MfsParams& params, const Shape& body, doub
   }
 
   const FibreMap map = find_fibres(read_gray(params.micrograph ? *params.micrograph : bundled_micrograph()));
+  const Taper taper = params.taper ? limb_taper(part, params, body, across, extent) : Taper{};
   MembraneParams wanted;
   wanted.fibre_mm = params.fibre_mm;
   wanted.wall_mm = params.wall_mm;
+  wanted.gap_mm = params.gap_mm;
+  wanted.least_scale = std::min(1.0, taper.least());
   wanted.walls = params.walls;
-  // What reaches into the neighbour or out to the surface must still find membranes, not the clamped rim of the image.
-  wanted.width_mm = extent.max.x - extent.min.x + 2 * params.fibre_mm;
-  wanted.height_mm = extent.max.y - extent.min.y + 2 * params.fibre_mm;
+  // What reaches into the neighbour or out to the surface must still find membranes, not the clamped rim of the image;
+  // also where the section is drawn smallest.
+  const Vec2d middle = extent.center();
+  const auto side = [&](double low, double high) {
+    const double shrunk = std::max(std::abs(low), std::abs(high)) * (1 / wanted.least_scale - 1);
+    return high - low + 2 * (shrunk + params.fibre_mm);
+  };
+  wanted.width_mm = side(extent.min.x, extent.max.x);
+  wanted.height_mm = side(extent.min.y, extent.max.y);
   wanted.pixel_mm = pixel_mm;
   wanted.seed = mix(params.seed + static_cast<std::uint64_t>(part.id()));
   Fill fill;
-  fill.shape = sweep(synthesize(map, wanted), part.axis(), extent.center());
-  const SectionCount count = count_fibres(sections.front(), fill.shape, params.wall_mm, pixel_mm);
-  fill.fibres = count.fibres;
-  fill.free_edges = count.free_edges;
+  fill.shape = sweep(synthesize(map, wanted), part.axis(), middle, taper);
+  const FineSection section = fine_section(sections.front(), fill.shape, pixel_mm);
+  const double least_area = 0.25 * params.wall_mm * params.wall_mm;  // slits at the shell are no fibres
+  fill.section = census(section.membranes, pixel_mm, least_area, &section.lumen);
+  fill.micrograph = map.census;
+  fill.fibres = fill.section.fibres;
+  fill.free_edges = count_free_edges(section.membranes, section.lumen, params.wall_mm, pixel_mm);
   return fill;
 }
 

@@ -9,20 +9,24 @@
 #include <opencv2/imgproc.hpp>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fibrolite/error.h"
 #include "fibrolite/file.h"
 #include "infill/cells.h"
+#include "infill/census.h"
 
 namespace fibrolite {
 namespace {
 
 constexpr int max_side_px = 2048;      // larger templates are halved: fibres stay many pixels wide
 constexpr double distance_unit = 64;   // a pixel of distance in the integer height image
+constexpr double least_likeness = 0.1;     // of white noise 0; a photograph buried in noise as strong as itself has 0.3
+constexpr double least_two_levels = 0.68;  // of noise 0.64; fibres that can be told apart have 0.72 or more
 constexpr double saddle_ratio = 0.72;  // a waist wider than this share of the smaller fibre is no border
 
-/// 8-bit, no larger than max_side_px, grain smoothed, light evened out.
+/// 8-bit, no larger than max_side_px, light evened out.
 cv::Mat even_light(const GrayImage& micrograph) {
   cv::Mat gray(micrograph.height, micrograph.width, CV_8U);
   std::copy(micrograph.pixels.begin(), micrograph.pixels.end(), gray.begin<std::uint8_t>());
@@ -39,10 +43,32 @@ cv::Mat even_light(const GrayImage& micrograph) {
   cv::Mat flat;
   cv::divide(value, light, flat, 128);
   flat.convertTo(gray, CV_8U);
-  // No stronger: a membrane may be two pixels wide.
-  cv::medianBlur(gray, gray, 3);
-  cv::GaussianBlur(gray, gray, {3, 3}, 0.7);
   return gray;
+}
+
+/// How alike pixels two apart are: 0 of noise without grain, whatever its distribution.
+double likeness(const cv::Mat& gray) {
+  cv::Mat value;
+  gray.convertTo(value, CV_32F);
+  value -= cv::mean(value)[0];
+  const double square = value.dot(value) / static_cast<double>(value.total());
+  if (!(square > 0)) return 0;
+  double sum = 0;
+  for (const auto& [dx, dy] : {std::pair{2, 0}, std::pair{0, 2}}) {
+    const cv::Rect here(0, 0, value.cols - dx, value.rows - dy), there(dx, dy, here.width, here.height);
+    sum += value(here).dot(value(there)) / here.area();
+  }
+  return sum / (2 * square);
+}
+
+/// Share of the variance that two grey levels explain, one on each side of the mask: 2 / pi of normal noise, however
+/// coarse its grain; 1 of two clear levels.
+double two_levels(const cv::Mat& gray, const cv::Mat& mask) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(gray, mean, deviation);
+  const double share = cv::countNonZero(mask) / static_cast<double>(mask.total());
+  const double step = cv::mean(gray, mask)[0] - cv::mean(gray, ~mask)[0];
+  return deviation[0] > 0 ? share * (1 - share) * step * step / (deviation[0] * deviation[0]) : 0;
 }
 
 cv::Mat depth_of(const cv::Mat& mask) {
@@ -128,9 +154,32 @@ LabelImage to_labels(const cv::Mat& marker) {
   return label;
 }
 
+/// Signed distance to the membranes, px: to the edges of pixels, not their centres.
+FloatImage distance_to_membranes(const LabelImage& label) {
+  cv::Mat fibre(label.height, label.width, CV_8U);
+  for (int y = 0; y < label.height; ++y)
+    for (int x = 0; x < label.width; ++x) {
+      const int own = label(x, y);
+      // Fibres that touch are two voids all the same.
+      const bool touches = (x > 0 && label(x - 1, y) > 0 && label(x - 1, y) != own) ||
+                           (y > 0 && label(x, y - 1) > 0 && label(x, y - 1) != own);
+      fibre.at<std::uint8_t>(y, x) = own > 0 && !touches ? 255 : 0;
+    }
+  const cv::Mat inside = depth_of(fibre), outside = depth_of(~fibre);
+  FloatImage distance(label.width, label.height);
+  for (int y = 0; y < label.height; ++y)
+    for (int x = 0; x < label.width; ++x) {
+      const float in = inside.at<float>(y, x), out = outside.at<float>(y, x);
+      distance(x, y) = in > 0 ? in - 0.5F : 0.5F - out;
+    }
+  return distance;
+}
+
+constexpr const char* better_image = "use a sharp cross-section with fibres apart from each other, at least 12 pixels wide";
+
 [[noreturn]] void too_few(int found) {
   throw Error(Code::BadInput, "found " + std::to_string(found) + " fibres in the micrograph, at least 4 are needed",
-              "template image", "use a sharp cross-section with fibres apart from each other, at least 12 pixels wide");
+              "template image", better_image);
 }
 
 }  // namespace
@@ -138,8 +187,15 @@ LabelImage to_labels(const cv::Mat& marker) {
 FibreMap find_fibres(const GrayImage& micrograph) try {
   if (micrograph.width < 16 || micrograph.height < 16) too_few(0);
   cv::Mat gray = even_light(micrograph);
+  const double alike = likeness(gray);
+  // No stronger: a membrane may be two pixels wide.
+  cv::medianBlur(gray, gray, 3);
+  cv::GaussianBlur(gray, gray, {3, 3}, 0.7);
   cv::Mat fibre;
   cv::threshold(gray, fibre, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  if (alike < least_likeness || two_levels(gray, fibre) < least_two_levels)
+    throw Error(Code::BadInput, "nothing stands out in the micrograph: it is even, or noise", "template image",
+                better_image);
   if (!bright_is_fibre(fibre)) {
     gray = 255 - gray;
     fibre = ~fibre;
@@ -176,6 +232,8 @@ FibreMap find_fibres(const GrayImage& micrograph) try {
   cells = measure_cells(map.label, map.fibres);
   map.mean_pitch_px = mean_pitch(map.label, cells);
   clear_membranes(map.label);
+  map.census = census(distance_to_membranes(map.label), 1, 0);
+  map.census.fibres = map.fibres;
   return map;
 } catch (const cv::Exception& e) {
   throw Error(Code::Internal, "image processing failed: " + e.err, "find_fibres");

@@ -79,7 +79,7 @@ Sweep::Sweep(const Axis& axis) {
     turned += norm(line_[i].z - line_[i - 1].z);
     const bool next_too_far = i + 1 < line_.size() && turned + norm(line_[i + 1].z - line_[i].z) > max_turn_rad;
     if (!next_too_far && i + 1 < line_.size()) continue;
-    stations_.push_back({line_[i]});
+    stations_.push_back({line_[i], 0, 0, arc_mm_.back()});
     turned = 0;
   }
   double total_turn = 0;
@@ -133,18 +133,22 @@ bool Sweep::in_slab(int slab, Vec3d p) const {
   return (slab < 0 || height(slab) >= 0) && (slab == last() || height(slab + 1) < 0);
 }
 
-void Sweep::map_in_slab(int slab, const float* x, const float* y, const float* z, int count, float* u, float* v) const {
+void Sweep::map_in_slab(int slab, const float* x, const float* y, const float* z, int count, Places out) const {
+  float *u = out.u, *v = out.v;
   const Station& station = stations_[static_cast<std::size_t>(std::max(slab, 0))];
   const Plane& a = planes_[static_cast<std::size_t>(std::max(slab, 0))];
+  const auto from = static_cast<float>(station.at_mm);
   if (slab < 0 || slab == last()) {
     for (int i = 0; i < count; ++i) {
       const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
       u[i] = dx * a.ux + dy * a.uy + dz * a.uz;
       v[i] = dx * a.vx + dy * a.vy + dz * a.vz;
+      if (out.along != nullptr) out.along[i] = from + dx * a.tx + dy * a.ty + dz * a.tz;
     }
     return;
   }
   const Plane& b = planes_[static_cast<std::size_t>(slab) + 1];
+  const auto length = static_cast<float>(stations_[static_cast<std::size_t>(slab) + 1].at_mm) - from;
   const auto bend_u = static_cast<float>(0.5 * station.bend_u), bend_v = static_cast<float>(0.5 * station.bend_v);
   for (int i = 0; i < count; ++i) {
     const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
@@ -157,11 +161,13 @@ void Sweep::map_in_slab(int slab, const float* x, const float* y, const float* z
     const float sagitta = (1 - s) * above;
     u[i] = (1 - s) * (dx * a.ux + dy * a.uy + dz * a.uz) + s * (ex * b.ux + ey * b.uy + ez * b.uz) - sagitta * bend_u;
     v[i] = (1 - s) * (dx * a.vx + dy * a.vy + dz * a.vz) + s * (ex * b.vx + ey * b.vy + ez * b.vz) - sagitta * bend_v;
+    if (out.along != nullptr) out.along[i] = from + s * length;
   }
 }
 
-void Sweep::map(const PointBlock& block, float* u, float* v) const {
-  if (stations_.size() == 1) return map_in_slab(0, block.x, block.y, block.z, block.count, u, v);
+void Sweep::map(const PointBlock& block, float* u, float* v, float* along) const {
+  const Places out{u, v, along};
+  if (stations_.size() == 1) return map_in_slab(0, block.x, block.y, block.z, block.count, out);
   Box3d box;
   for (int i = 0; i < block.count; ++i) box.include({block.x[i], block.y[i], block.z[i]});
   const Vec3d center = box.center();
@@ -177,23 +183,22 @@ void Sweep::map(const PointBlock& block, float* u, float* v) const {
     if (distance[static_cast<std::size_t>(slab - lowest)] <= reach) candidates.push_back(slab);
 
   if (candidates.back() - candidates.front() + 1 == static_cast<int>(candidates.size()) && candidates.size() <= 8) {
-    map_in_run(candidates.front(), candidates.back(), block, center, radius, u, v);
+    map_in_run(candidates.front(), candidates.back(), block, center, radius, out);
   } else {
-    map_by_distance(candidates, block, u, v);
+    map_by_distance(candidates, block, out);
   }
 }
 
 /// One stretch of neighbouring slabs: their planes do not cross inside the limb, so the number of planes passed is the
 /// slab.
-void Sweep::map_in_run(int from, int to, const PointBlock& block, Vec3d center, double radius, float* u,
-                       float* v) const {
+void Sweep::map_in_run(int from, int to, const PointBlock& block, Vec3d center, double radius, Places out) const {
   const auto height = [&](int k) {
     const Frame& f = stations_[static_cast<std::size_t>(k)].frame;
     return dot(center - f.origin, f.z);
   };
   while (from < to && height(from + 1) >= radius) ++from;
   while (from < to && height(to) < -radius) --to;
-  if (from == to) return map_in_slab(from, block.x, block.y, block.z, block.count, u, v);
+  if (from == to) return map_in_slab(from, block.x, block.y, block.z, block.count, out);
 
   const auto count = static_cast<std::size_t>(block.count);
   std::array<int, PointBlock::capacity> passed{};
@@ -202,19 +207,23 @@ void Sweep::map_in_run(int from, int to, const PointBlock& block, Vec3d center, 
     for (std::size_t i = 0; i < count; ++i)
       passed[i] += (block.x[i] - p.cx) * p.tx + (block.y[i] - p.cy) * p.ty + (block.z[i] - p.cz) * p.tz >= 0 ? 1 : 0;
   }
-  std::array<float, PointBlock::capacity> slab_u, slab_v;
+  std::array<float, PointBlock::capacity> slab_u, slab_v, slab_along;
+  const bool where = out.along != nullptr;
   for (int slab = from; slab <= to; ++slab) {
-    map_in_slab(slab, block.x, block.y, block.z, block.count, slab_u.data(), slab_v.data());
+    map_in_slab(slab, block.x, block.y, block.z, block.count,
+                {slab_u.data(), slab_v.data(), where ? slab_along.data() : nullptr});
     for (std::size_t i = 0; i < count; ++i) {
-      u[i] = passed[i] == slab - from ? slab_u[i] : u[i];
-      v[i] = passed[i] == slab - from ? slab_v[i] : v[i];
+      out.u[i] = passed[i] == slab - from ? slab_u[i] : out.u[i];
+      out.v[i] = passed[i] == slab - from ? slab_v[i] : out.v[i];
     }
+    for (std::size_t i = 0; where && i < count; ++i)
+      out.along[i] = passed[i] == slab - from ? slab_along[i] : out.along[i];
   }
 }
 
 /// Several stretches of the limb are near: of the slabs that hold a point, the one whose stretch of line is nearest has
 /// it.
-void Sweep::map_by_distance(const std::vector<int>& slabs, const PointBlock& block, float* u, float* v) const {
+void Sweep::map_by_distance(const std::vector<int>& slabs, const PointBlock& block, Places out) const {
   for (int i = 0; i < block.count; ++i) {
     const Vec3d p{block.x[i], block.y[i], block.z[i]};
     int holder = slabs.front(), any = holder;
@@ -231,8 +240,21 @@ void Sweep::map_by_distance(const std::vector<int>& slabs, const PointBlock& blo
       }
     }
     if (std::isinf(holder_mm)) holder = any;
-    map_in_slab(holder, block.x + i, block.y + i, block.z + i, 1, u + i, v + i);
+    map_in_slab(holder, block.x + i, block.y + i, block.z + i, 1, out.from(i));
   }
+}
+
+double Sweep::curvature_at(double share) const {
+  if (stations_.size() < 2) return 0;
+  const double at = std::clamp(share, 0.0, 1.0) * arc_mm_.back();
+  std::size_t k = 0;
+  while (k + 2 < stations_.size() && stations_[k + 1].at_mm < at) ++k;
+  // The sharper of this stretch and its neighbours: a turn is known between stations, not where in between.
+  double most = 0;
+  for (std::size_t i = k == 0 ? 0 : k - 1; i <= std::min(k + 1, stations_.size() - 2); ++i)
+    most = std::max(most, std::hypot(stations_[i].bend_u, stations_[i].bend_v) /
+                              (stations_[i + 1].at_mm - stations_[i].at_mm));
+  return most;
 }
 
 Frame Sweep::frame_at(double share) const {

@@ -17,13 +17,18 @@ namespace fibrolite {
 class Sweep {
  public:
   explicit Sweep(const Axis& axis);
-  /// (u, v) of every point of the block, mm. Continuous inside the limb.
-  void map(const PointBlock& block, float* u, float* v) const;
+  /// (u, v) of every point of the block, mm, and, unless null, how far along the line its normal plane stands, mm from
+  /// the line's start (below 0 and beyond the length where the limb goes straight on). Continuous inside the limb.
+  void map(const PointBlock& block, float* u, float* v, float* along = nullptr) const;
+  [[nodiscard]] double length_mm() const { return arc_mm_.back(); }
   /// The frame at a share of the line's length, 0 to 1; z along the limb.
   [[nodiscard]] Frame frame_at(double share) const;
   /// How fast the frame turns about a ring's line so that it meets itself, rad / mm: the map of a place r mm off the
   /// line is 1 + (r * twist)^2 / 2 Lipschitz at most. 0 along an open line.
   [[nodiscard]] double twist_per_mm() const { return twist_per_mm_; }
+  [[nodiscard]] bool closed() const { return closed_; }
+  /// Turn of the tangent at a share of the line's length, rad / mm: the most of the stations about it.
+  [[nodiscard]] double curvature_at(double share) const;
 
  private:
   void close();
@@ -32,6 +37,7 @@ class Sweep {
   struct Station {
     Frame frame;                    // z is the tangent
     double bend_u = 0, bend_v = 0;  // turn of the tangent towards u and v until the next station, rad
+    double at_mm = 0;               // from the line's start
   };
   /// A station's frame in single precision: origin, tangent, u and v axis.
   struct Plane {
@@ -40,9 +46,14 @@ class Sweep {
   };
   [[nodiscard]] double distance_to_slab(int slab, Vec3d p) const;
   [[nodiscard]] bool in_slab(int slab, Vec3d p) const;
-  void map_in_slab(int slab, const float* x, const float* y, const float* z, int count, float* u, float* v) const;
-  void map_in_run(int from, int to, const PointBlock& block, Vec3d center, double radius, float* u, float* v) const;
-  void map_by_distance(const std::vector<int>& slabs, const PointBlock& block, float* u, float* v) const;
+  /// Where answers go; `along` may be null.
+  struct Places {
+    float *u, *v, *along;
+    [[nodiscard]] Places from(int i) const { return {u + i, v + i, along == nullptr ? nullptr : along + i}; }
+  };
+  void map_in_slab(int slab, const float* x, const float* y, const float* z, int count, Places out) const;
+  void map_in_run(int from, int to, const PointBlock& block, Vec3d center, double radius, Places out) const;
+  void map_by_distance(const std::vector<int>& slabs, const PointBlock& block, Places out) const;
   [[nodiscard]] int last() const { return static_cast<int>(stations_.size()) - 1; }
 
   std::vector<Station> stations_;

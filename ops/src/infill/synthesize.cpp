@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/infill/micrograph.h"
@@ -13,7 +14,7 @@
 #include "infill/cells.h"
 #include "infill/network.h"
 #include "infill/quilt.h"
-#include "plane_image.h"
+#include "infill/thickness.h"
 
 namespace fibrolite {
 namespace {
@@ -21,7 +22,6 @@ namespace {
 constexpr int pitch_px = 14;           // of the quilted texture; borders become smooth lines, so it needs no more
 constexpr double saddle_ratio = 0.75;  // a waist wider than this share of the smaller cell is no border
 constexpr int smoothing_rounds = 14;   // reaches about sqrt(rounds) = 4 px along a border
-constexpr double least_void = 0.12;    // radius of the smallest void, in fibres
 constexpr int max_side_px = 20000;
 
 void check(const FibreMap& map, const MembraneParams& p) {
@@ -29,10 +29,14 @@ void check(const FibreMap& map, const MembraneParams& p) {
     throw Error(Code::BadRecipe, what, where, hint);
   };
   if (!(p.wall_mm > 0)) refuse("the membrane must have a thickness above zero", "mfs.wall_mm", "try 0.8");
-  if (!(p.fibre_mm > least_fibre_mm(p.wall_mm, p.walls)) || !std::isfinite(p.fibre_mm))
-    refuse(p.walls == Walls::Image ? "a fibre must be wider than two membranes"
-                                   : "fibres with triangles between them must lie more than four walls apart",
-           "mfs.fibre_mm", "raise fibre_mm or lower wall_mm");
+  if (!(p.gap_mm > 0)) refuse("the narrowest void must have a width above zero", "mfs.gap_mm", "try 0.4");
+  if (!(p.fibre_mm > least_fibre_mm(p.wall_mm, p.gap_mm, p.walls)) || !std::isfinite(p.fibre_mm))
+    refuse(p.walls == Walls::Image ? "a fibre must be wider than two membranes, and than a membrane and a gap"
+                                   : "fibres with triangles between them must lie more than four walls apart, and than "
+                                     "two walls and two gaps",
+           "mfs.fibre_mm", "raise fibre_mm, or lower wall_mm or gap_mm");
+  if (!(p.least_scale > 0) || p.least_scale > 1)
+    refuse("the section cannot be shrunk by that", "least_scale", "use a number up to 1");
   if (!(p.pixel_mm > 0) || p.pixel_mm > p.wall_mm / 4 * 1.001)
     refuse("the pixel must be at most a quarter of the membrane", "pixel_mm", "use wall_mm / 4");
   if (!(p.width_mm > 0) || !(p.height_mm > 0)) refuse("the section has no size", "width_mm, height_mm", "");
@@ -103,21 +107,6 @@ std::vector<Segment2d> triangle_sides(const LabelImage& cells, int count) {
   return sides;
 }
 
-/// A neck in a cell parts a pocket from its void. Pockets too small to keep become membrane: their distance is mirrored
-/// at zero, which keeps it 1-Lipschitz and its magnitude at most the distance.
-void fill_pockets(FloatImage& distance, double least_depth_mm) {
-  Image<std::uint8_t> mask(distance.width, distance.height);
-  for (std::size_t i = 0; i < mask.pixels.size(); ++i) mask.pixels[i] = distance.pixels[i] > 0;
-  const Regions voids = regions_of(mask);
-  std::vector<float> depth(static_cast<std::size_t>(voids.count), 0);
-  for (std::size_t i = 0; i < mask.pixels.size(); ++i)
-    if (const int v = voids.label.pixels[i]; v > 0)
-      depth[static_cast<std::size_t>(v - 1)] = std::max(depth[static_cast<std::size_t>(v - 1)], distance.pixels[i]);
-  for (std::size_t i = 0; i < mask.pixels.size(); ++i)
-    if (const int v = voids.label.pixels[i]; v > 0 && depth[static_cast<std::size_t>(v - 1)] < least_depth_mm)
-      distance.pixels[i] = -std::max(distance.pixels[i], 1e-4F);
-}
-
 }  // namespace
 
 MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) try {
@@ -135,7 +124,7 @@ MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) try 
       quilt(texture, side(params.width_mm), side(params.height_mm), quilting, Random(params.seed, "quilt"));
 
   int count = 0;
-  const double least_px = (params.wall_mm / 2 / params.fibre_mm + least_void) * pitch_px;
+  const double least_px = (params.wall_mm + params.gap_mm) / 2 / params.fibre_mm * pitch_px;
   const LabelImage cells = find_cells(quilted, least_px, count);
   // Lines can be scaled freely: the pitch comes out exactly as wanted.
   const double found_pitch_px = mean_pitch(cells, measure_cells(cells, count));
@@ -147,14 +136,13 @@ MembraneImage synthesize(const FibreMap& map, const MembraneParams& params) try 
 
   MembraneImage result;
   result.pixel_mm = params.pixel_mm;
+  result.wall_mm = params.wall_mm;
   const int width = static_cast<int>(std::ceil(params.width_mm / params.pixel_mm)) + 1;
   const int height = static_cast<int>(std::ceil(params.height_mm / params.pixel_mm)) + 1;
   const Vec2d corner{-0.5 * (width - 1) * params.pixel_mm, -0.5 * (height - 1) * params.pixel_mm};
-  const double half_wall = params.wall_mm / 2;
   result.distance_mm =
-      distance_to_segments(borders, corner, params.pixel_mm, width, height, half_wall + 0.5 * params.fibre_mm);
-  for (float& d : result.distance_mm.pixels) d -= static_cast<float>(half_wall);
-  fill_pockets(result.distance_mm, 0.8 * least_void * params.fibre_mm);
+      walls_along(std::move(borders), {corner, params.pixel_mm, width, height},
+                  {params.wall_mm, params.gap_mm, params.least_scale}, 0.5 * (params.wall_mm + params.fibre_mm));
   return result;
 } catch (const cv::Exception& e) {
   throw Error(Code::Internal, "image processing failed: " + e.err, "synthesize");

@@ -7,11 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <opencv2/imgcodecs.hpp>
 #include <set>
+#include <tuple>
 
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
 #include "generator.h"
+#include "micrographs.h"
 #include "models.h"
 
 namespace fibrolite {
@@ -104,6 +107,77 @@ TEST(Micrograph, AnImageWithoutFibresIsRefused) {
   for (int y = 0; y < 40; ++y)
     for (const int x : {38, 39, 40, 78, 79, 80}) three(x, y) = 60;
   EXPECT_EQ(code(three), Code::BadInput);
+}
+
+/// Light that falls to less than half from side to side and again to half toward the corners, and noise.
+TEST(Micrograph, APhotographWithUnevenLightShowsItsFibres) {
+  for (const double pitch : {24.0, 34.0, 60.0})
+    for (const double noise : {0.0, 8.0, 24.0}) {
+      int drawn = 0;
+      const FibreMap map = find_fibres(photograph(11, pitch, 600, noise, &drawn));
+      EXPECT_NEAR(map.fibres, drawn, 0.03 * drawn) << pitch << ' ' << noise;
+    }
+}
+
+TEST(Micrograph, AnImageWithoutStructureIsRefused) {
+  const auto refused = [](const GrayImage& image) {
+    try {
+      (void)find_fibres(image);
+    } catch (const Error& e) {
+      return e.code() == Code::BadInput;
+    }
+    return false;
+  };
+  for (const double sd : {2.0, 10.0, 40.0})
+    for (const int grain : {0, 1, 4, 30}) EXPECT_TRUE(refused(pure_noise(3, 400, 128, sd, grain))) << sd << ' ' << grain;
+  Random random(5, "test");
+  GrayImage even(400, 400), black_and_white(400, 400), ramp(400, 400), dome(400, 400);
+  for (std::uint8_t& p : even.pixels) p = static_cast<std::uint8_t>(random.below(256));
+  for (std::uint8_t& p : black_and_white.pixels) p = random.uniform() < 0.5 ? 255 : 0;
+  for (int y = 0; y < 400; ++y)
+    for (int x = 0; x < 400; ++x) {
+      ramp(x, y) = static_cast<std::uint8_t>(30 + x / 2);
+      dome(x, y) = static_cast<std::uint8_t>(220 - ((x - 200) * (x - 200) + (y - 200) * (y - 200)) / 500);
+    }
+  EXPECT_TRUE(refused(even));
+  EXPECT_TRUE(refused(black_and_white));
+  EXPECT_TRUE(refused(ramp));
+  EXPECT_TRUE(refused(dome));
+}
+
+/// Hexagons of pitch p with walls w: (p - w)^2 sqrt(3) / 2 each.
+TEST(Micrograph, CensusOfAHoneycomb) {
+  for (const auto& [columns, rows, pitch, wall] : {std::tuple{14, 12, 24.0, 4.0}, std::tuple{10, 9, 60.0, 20.0}}) {
+    const GrayImage image = honeycomb(columns, rows, pitch, wall);
+    const FibreMap map = find_fibres(image);
+    const double area = (pitch - wall) * (pitch - wall) * std::sqrt(0.75);
+    EXPECT_EQ(map.census.fibres, columns * rows);
+    EXPECT_NEAR(map.census.mean_area, area, 0.08 * area) << "the corners are rounded";
+    EXPECT_NEAR(map.census.membrane, wall, 0.5);
+    const double porosity = columns * rows * area / (image.width * image.height);
+    EXPECT_NEAR(map.census.porosity, porosity, 0.08 * porosity);
+    EXPECT_NEAR(map.mean_pitch_px, pitch, 0.01 * pitch);
+  }
+}
+
+TEST(Micrograph, ColourInAnyFormatGivesTheSameFibres) {
+  int drawn = 0;
+  const GrayImage gray = photograph(4, 30, 400, 8, &drawn);
+  cv::Mat pink(gray.height, gray.width, CV_8UC3);
+  for (int y = 0; y < gray.height; ++y)
+    for (int x = 0; x < gray.width; ++x) {
+      const int v = gray(x, y);
+      pink.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(v * 2 / 3), static_cast<std::uint8_t>(v / 2),
+                                  static_cast<std::uint8_t>(v)};
+    }
+  const testing::TempDir folder;
+  for (const char* ending : {".png", ".jpg", ".tif"}) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(ending, pink, bytes);
+    std::ofstream(folder / ending, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()),
+                                                           static_cast<std::streamsize>(bytes.size()));
+    EXPECT_NEAR(find_fibres(read_gray(folder / ending)).fibres, drawn, 0.04 * drawn) << ending;
+  }
 }
 
 TEST(Micrograph, AFileThatIsNoImageIsRefused) {
@@ -223,7 +297,7 @@ TEST(Synthesize, CellsAreClosedAndNoneIsTinyOrHuge) {
     for (const Void& v : voids(image.distance_mm)) {
       EXPECT_LT(v.pixels * 0.01, 5 * mean_cell_mm2) << "a leak joins cells";
       if (!v.at_frame) {
-        EXPECT_GT(v.deepest_mm, 0.08 * 2.4) << "a void too small to keep";
+        EXPECT_GT(v.deepest_mm, 0.2 - 0.05) << "narrower than the gap";
       }
     }
   }
@@ -285,7 +359,7 @@ TEST(Synthesize, DistanceIsExactNearTheWall) {
   double worst = 0;
   for (int y = 20; y < d.height - 20; ++y)
     for (int x = 20; x < d.width - 20; ++x) {
-      if (d(x, y) <= 0 || d(x, y) > 0.3) continue;
+      if (d(x, y) <= 0 || d(x, y) > 0.15) continue;  // no void is narrower than 0.4
       double nearest = 1e9;
       for (const auto& [bx, by] : border) nearest = std::min(nearest, std::hypot(x - bx, y - by));
       worst = std::max(worst, std::abs(nearest * image.pixel_mm - d(x, y)));
@@ -293,28 +367,70 @@ TEST(Synthesize, DistanceIsExactNearTheWall) {
   EXPECT_LT(worst, 0.35 * image.pixel_mm) << "border points are up to a pixel apart";
 }
 
-TEST(Synthesize, TheTextureDoesNotRepeat) {
-  // A tile would show as a shift at which the image meets itself.
-  const MembraneImage image = membranes(40);
-  const FloatImage& d = image.distance_mm;
-  double mean = 0;
-  for (const float v : d.pixels) mean += v;
-  mean /= static_cast<double>(d.pixels.size());
-  const auto correlation = [&](int dx, int dy) {
-    double ab = 0, aa = 0, bb = 0;
-    for (int y = 0; y + dy < d.height; y += 2)
-      for (int x = 0; x + dx < d.width; x += 2) {
-        const double a = d(x, y) - mean, b = d(x + dx, y + dy) - mean;
-        ab += a * b;
-        aa += a * a;
-        bb += b * b;
-      }
-    return ab / std::sqrt(aa * bb);
+GrayImage doubled(const GrayImage& image) {
+  GrayImage twice(2 * image.width, 2 * image.height);
+  for (int y = 0; y < twice.height; ++y)
+    for (int x = 0; x < twice.width; ++x) {
+      const int i = std::min(x / 2 + (x & 1), image.width - 1), j = std::min(y / 2 + (y & 1), image.height - 1);
+      twice(x, y) = static_cast<std::uint8_t>(
+          (image(x / 2, y / 2) + image(i, y / 2) + image(x / 2, j) + image(i, j) + 2) / 4);
+    }
+  return twice;
+}
+
+/// Fibres to a square millimetre are 1 / (pitch^2 sqrt(3) / 2) of even hexagons; of the same cells at any resolution
+/// they are the same.
+TEST(Synthesize, FibresAreAsLargeWhateverTheResolutionOfTheImage) {
+  const auto per_mm2 = [](const GrayImage& image) {
+    MembraneParams params;
+    params.width_mm = params.height_mm = 50;
+    const MembraneImage made = synthesize(find_fibres(image), params);
+    double whole = 0, cut = 0;
+    for (const Void& v : voids(made.distance_mm)) (v.at_frame ? cut : whole) += 1;
+    return (whole + cut / 2) / (made.width_mm() * made.height_mm());
   };
-  EXPECT_GT(correlation(1, 0), 0.9);
-  double worst = 0;
-  for (int shift = 48; shift < 200; ++shift) worst = std::max({worst, correlation(shift, 0), correlation(0, shift)});
-  EXPECT_LT(worst, 0.3);
+  const double once = per_mm2(muscle());
+  // A pitch within 3 %.
+  EXPECT_NEAR(per_mm2(halved(muscle())), once, 0.06 * once);
+  EXPECT_NEAR(per_mm2(doubled(muscle())), once, 0.06 * once);
+}
+
+/// A tile shows as a shift at which an image meets itself: the largest correlation over all shifts from two fibres on.
+double likest_shift(const FloatImage& fine, int every, int from) {
+  FloatImage image(fine.width / every, fine.height / every);
+  double mean = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) mean += image(x, y) = fine(x * every, y * every);
+  mean /= static_cast<double>(image.pixels.size());
+  const int most = std::min(image.width, image.height) / 2;
+  double likest = 0;
+  for (int dy = 0; dy < most; ++dy)
+    for (int dx = -most + 1; dx < most; ++dx) {
+      if (std::hypot(dx, dy) < from) continue;
+      double ab = 0, aa = 0, bb = 0;
+      for (int y = 0; y + dy < image.height; ++y)
+        for (int x = std::max(0, -dx); x + std::max(0, dx) < image.width; ++x) {
+          const double a = image(x, y) - mean, b = image(x + dx, y + dy) - mean;
+          ab += a * b;
+          aa += a * a;
+          bb += b * b;
+        }
+      likest = std::max(likest, ab / std::sqrt(aa * bb));
+    }
+  return likest;
+}
+
+TEST(Synthesize, NoShiftShowsATile) {
+  constexpr double bound = 0.3;
+  const MembraneImage large = membranes(48);
+  EXPECT_LT(likest_shift(large.distance_mm, 4, 12), bound);
+  // A section of 11 mm laid side by side: the same method sees it.
+  const MembraneImage small = membranes(11);
+  FloatImage tiled(large.distance_mm.width, large.distance_mm.height);
+  for (int y = 0; y < tiled.height; ++y)
+    for (int x = 0; x < tiled.width; ++x)
+      tiled(x, y) = small.distance_mm(x % small.distance_mm.width, y % small.distance_mm.height);
+  EXPECT_GT(likest_shift(tiled, 4, 12), 0.9);
 }
 
 TEST(Synthesize, SameSeedSameBitsOnAnyNumberOfThreads) {

@@ -7,7 +7,11 @@
 #include <vector>
 
 #include "fibrolite/mesh.h"
+<<<<<<< HEAD
 #include "fibrolite/ops/mend.h"
+=======
+#include "fibrolite/ops/fill.h"
+>>>>>>> bc4b4dc
 #include "fibrolite/ops/recipe.h"
 
 namespace fibrolite {
@@ -20,6 +24,7 @@ struct PartReport {
   double lumen_mm3 = 0;          ///< Inside the shell.
   double infill_volume_mm3 = 0;  ///< Material in the lumen.
   int fibres = 0;
+  FibreCensus section{}, micrograph{};  ///< As in Fill.
   Vec3d centroid_mm{}, axis{};
   double diameter_mm = 0;
   PartStress stress;
