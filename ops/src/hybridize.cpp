@@ -26,6 +26,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
 
   // Parts (paper Sec. 4): everything that must not depend on the voxel is decided on a proxy and on the mesh itself.
   std::function<double(Vec3d, Vec3d)> traction_mpa;
+  std::function<double(Vec3d)> stress_mpa;
   if (params.infill == InfillKind::Hybrid) {
     // Decided as the model stands under its load, however both lie in the file.
     const Frame stand = stance(recipe.verify);
@@ -44,6 +45,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     traction_mpa = [stand, standing = verified.traction_mpa](Vec3d p, Vec3d n) {
       return standing(stand.to_local(p), stand.to_local(n));
     };
+    stress_mpa = [stand, standing = verified.von_mises_mpa](Vec3d p) { return standing(stand.to_local(p)); };
   } else {
     out.parts = whole_body(model.mesh, params.infill == InfillKind::Mfs ? Kind::Column : Kind::Bulk);
   }
@@ -53,7 +55,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const Shape model_distance = sections ? distance_to(WindingTree(model.mesh)) : Shape();
   std::vector<Fill> fills;
   run("infill", 0.40, [&](const Context& c) {
-    const auto thickness = grading(model.mesh, recipe, c);
+    const auto thickness = grading(model.mesh, recipe, stress_mpa, c);
     for (const Part& p : out.parts.parts) fills.push_back(fill(p, params.infill, recipe, model_distance, thickness));
   });
   std::vector<double> demand_n;

@@ -149,6 +149,8 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   check_material(recipe.material);
   check_loads(recipe.verify.loads);
   if (hybrid || infill == InfillKind::Tcs) check_tcs(recipe.tcs);
+  if (infill == InfillKind::Tcs && recipe.tcs.grade == TcsGrade::Stress)
+    unfit("tcs.grade is stress, which only a hybrid run knows", "recipe", "use --infill hybrid, or tcs.grade=surface");
   if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
   if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);
 

@@ -94,7 +94,7 @@ void read(const Json& json, std::optional<std::filesystem::path>& value, Range, 
 constexpr std::array<const char*, 2> words(Walls) { return {"image", "delaunay"}; }
 constexpr std::array<const char*, 2> words(Bridge) { return {"mst", "bbox"}; }
 constexpr std::array<const char*, 3> words(TcsForm) { return {"sticks", "network", "sheet"}; }
-constexpr std::array<const char*, 2> words(TcsGrade) { return {"none", "surface"}; }
+constexpr std::array<const char*, 3> words(TcsGrade) { return {"none", "surface", "stress"}; }
 
 template <class Enum>
 concept Worded = requires(Enum value) {
@@ -242,13 +242,14 @@ const std::vector<Field>& table() {
             "turns of the lattice about its origin: about world x, then y, then z"),
       field("tcs.stretch_z", &R::tcs, &TcsParams::stretch_z,
             "cells taller by sqrt(2): sticks at 45 degrees, printable without support"),
-      field("tcs.grade", &R::tcs, &TcsParams::grade, "where members are thicker: nowhere, or toward the surface"),
+      field("tcs.grade", &R::tcs, &TcsParams::grade,
+            "where members are thicker: nowhere, toward the surface, or where the body carries more"),
       field("tcs.grade_least", &R::tcs, &TcsParams::grade_least, {0.01, 10},
-            "if graded, thickness of all members is multiplied by this deep inside"),
+            "if graded, thickness of all members is multiplied by this deep inside, or where nothing is carried"),
       field("tcs.grade_most", &R::tcs, &TcsParams::grade_most, {0.01, 10},
-            "and by this under the shell; tcs.grade_least or more"),
+            "and by this under the shell, or where most is carried; tcs.grade_least or more"),
       field("tcs.grade_depth_mm", &R::tcs, &TcsParams::grade_depth_mm, {0.04, 1000},
-            "how deep under the shell the change ends; tcs.cell_mm or more"),
+            "within what the one becomes the other; tcs.cell_mm or more"),
 
       field("joint.enabled", &R::joint, &JointParams::enabled, "layers and columns where parts meet"),
       field("joint.bridge", &R::joint, &JointParams::bridge,

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "fibrolite/blocks.h"
+#include "fibrolite/ops/grading.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
 
@@ -26,8 +27,16 @@ PartInfill infill_of(const Part& part, InfillKind run) {
   return PartInfill::Solid;
 }
 
-std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const Context& context) {
-  if (recipe.tcs.grade == TcsGrade::None) return std::nullopt;
+std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const std::function<double(Vec3d)>& stress_mpa,
+                             const Context& context) {
+  const TcsParams& tcs = recipe.tcs;
+  if (tcs.grade == TcsGrade::None) return std::nullopt;
+  if (tcs.grade == TcsGrade::Stress) {
+    const StressGrade grade{.least = tcs.grade_least, .most = tcs.grade_most, .slope_mm = tcs.grade_depth_mm};
+    const Box3d box = bounds(mesh);
+    const Solid coarse = to_solid(mesh, {.grid = {.voxel_mm = box.longest_side() / 100}}, context).solid;
+    return thicker_where_stressed(grade, box, distance_to(coarse), stress_mpa, context);
+  }
   // Of its own, coarse voxel, so that the fine one changes nothing.
   const double shell_mm = recipe.shell.thickness_mm, depth = recipe.tcs.grade_depth_mm;
   const ToSolidParams coarse{.grid = {.voxel_mm = depth / 8}, .inside_band_mm = shell_mm + depth};

@@ -71,6 +71,13 @@ struct Whole {
     return most;
   }
 
+  [[nodiscard]] double von_mises_mpa(Vec3d p) const {
+    const std::uint32_t tet = locator.find(p).tet;
+    double most = 0;
+    for (const fem::Solution& s : model.solutions) most = std::max(most, von_mises(s.centroid_stress[tet]));
+    return most;
+  }
+
   const Model model;
   const fem::Locator locator;
 };
@@ -414,6 +421,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   const Model& body = whole->model;
   const fem::Locator& locator = whole->locator;
   result.traction_mpa = [whole](Vec3d p, Vec3d n) { return whole->traction_mpa(p, n); };
+  result.von_mises_mpa = [whole](Vec3d p) { return whole->von_mises_mpa(p); };
   account(result, body, setting);
   for (const AppliedLoad& load : setting.loads)
     result.selected.insert(result.selected.end(), load.selected().begin(), load.selected().end());

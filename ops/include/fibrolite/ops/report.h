@@ -7,11 +7,8 @@
 #include <vector>
 
 #include "fibrolite/mesh.h"
-<<<<<<< HEAD
-#include "fibrolite/ops/mend.h"
-=======
 #include "fibrolite/ops/fill.h"
->>>>>>> bc4b4dc
+#include "fibrolite/ops/mend.h"
 #include "fibrolite/ops/recipe.h"
 
 namespace fibrolite {

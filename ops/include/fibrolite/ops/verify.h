@@ -51,6 +51,8 @@ struct Verification {
   /// Length of the traction, MPa, on the plane through a point of the body with a unit normal, in the load case where
   /// it is largest; from the solve of the whole body, taken as solid. Thread-safe.
   std::function<double(Vec3d point_mm, Vec3d normal)> traction_mpa;
+  /// Von Mises stress there, MPa, of the load case where it is largest; otherwise the same.
+  std::function<double(Vec3d point_mm)> von_mises_mpa;
   StressField field;  ///< If asked for. In the frame of the proxy.
 };
 /// A solve of the whole body for each load case (params.loads; if there are none, load from above, and the same at 45

@@ -35,6 +35,7 @@ constexpr double cell_per_member(TcsForm form) { return form == TcsForm::Network
 enum class TcsGrade {
   None,
   Surface,  ///< Toward the body's surface.
+  Stress,   ///< Where the verification found that the body carries much.
 };
 
 /// Tetrahedral crystal (diamond cubic): balls at the nodes, sticks along the bonds; or the smooth forms of it.
@@ -51,9 +52,9 @@ struct TcsParams {
   Vec3d rotate_deg{};      ///< Turns about the origin: about world x, then y, then z.
   bool stretch_z = false;  ///< Cell taller by sqrt(2) along its z: of a cube, sticks at 45 degrees, self-supporting.
   TcsGrade grade = TcsGrade::None;
-  double grade_least = 1;      ///< If graded, thickness of all members is multiplied by this deep inside...
-  double grade_most = 1.5;     ///< ...and by this at the inner face of the shell; grade_least or more.
-  double grade_depth_mm = 10;  ///< How deep under the shell the change ends; the longest edge of the cell or more.
+  double grade_least = 1;   ///< If graded, thickness of all members is multiplied by this deep inside, or idle...
+  double grade_most = 1.5;  ///< ...and by this at the inner face of the shell, or at full stress; grade_least or more.
+  double grade_depth_mm = 10;  ///< Within what the one becomes the other; the longest edge of the cell or more.
 };
 /// The crystal, unclipped, world frame. @throws Error BadRecipe (a range above). Cost: O(1) per point. Source: paper
 /// Sec. 5.2; the sizes are ours. Sheet and network: von Schnering and Nesper 1991 (nodal approximation of the D

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How thick members are where: fields of factors for the graded crystal (TcsParams::grade).
+#pragma once
+
+#include <functional>
+
+#include "fibrolite/box.h"
+#include "fibrolite/context.h"
+#include "fibrolite/shape.h"
+
+namespace fibrolite {
+
+struct StressGrade {
+  double least = 1, most = 1.5;  ///< Factors where nothing is carried, and from the full stress on; 0 < least <= most.
+  double slope_mm = 10;          ///< From the one to the other takes this long at least; > 0.
+};
+/// least + (most - least) * stress / full, at most `most`, where the full stress is the one that 95 % of the body's
+/// volume stays below; raised around the places that need it so that it never falls faster than slope_mm allows. It
+/// follows the stresses' course, not their size: twice the load gives the same field. A table with a step of
+/// slope_mm / 6 over `box` (coarser beyond 2 million entries); outside the box the nearest entry counts.
+/// `stress_mpa`: any measure of how much a point carries, 0 or more, thread-safe; `body`: negative inside.
+/// lipschitz(): sqrt(3) (most - least) / slope_mm. @throws Error BadRecipe (a range above); Cancelled. Cost: one call
+/// of `stress_mpa` per entry inside. Source: ours.
+[[nodiscard]] Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const Shape& body,
+                                           const std::function<double(Vec3d)>& stress_mpa, const Context& context = {});
+
+}  // namespace fibrolite

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/grading.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "fibrolite/error.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr double most_entries = 2e6;
+constexpr double full_share = 0.95;  // of the volume: peaks under a load or at a corner are not what most members see
+
+/// Values on a lattice, trilinear between.
+struct Table final : Shape::Function {
+  Vec3d origin{};
+  double step = 1, steepest = 0;
+  std::array<int, 3> size{1, 1, 1};
+  std::vector<float> value;
+
+  [[nodiscard]] std::size_t at(int i, int j, int k) const {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(size[0]) +
+           static_cast<std::size_t>(i);
+  }
+  [[nodiscard]] Vec3d place(int i, int j, int k) const {
+    return origin + step * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
+  }
+  void evaluate(const PointBlock& block, float* out) const override {
+    for (int n = 0; n < block.count; ++n) {
+      const std::array<double, 3> p{block.x[n] - origin.x, block.y[n] - origin.y, block.z[n] - origin.z};
+      std::array<int, 3> cell{};
+      std::array<float, 3> w{};
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double s = std::clamp(p[axis] / step, 0.0, static_cast<double>(size[axis] - 1));
+        cell[axis] = std::min(static_cast<int>(s), size[axis] - 2);
+        w[axis] = static_cast<float>(s - cell[axis]);
+      }
+      const auto along_x = [&](int j, int k) {
+        const std::size_t first = at(cell[0], cell[1] + j, cell[2] + k);
+        return value[first] + w[0] * (value[first + 1] - value[first]);
+      };
+      const float low = along_x(0, 0) + w[1] * (along_x(1, 0) - along_x(0, 0));
+      const float high = along_x(0, 1) + w[1] * (along_x(1, 1) - along_x(0, 1));
+      out[n] = low + w[2] * (high - low);
+    }
+  }
+  [[nodiscard]] double lipschitz() const override { return steepest; }
+};
+
+/// Each value at least that of its neighbours less what the way to them allows: once up and once down the lattice.
+void limit_slope(Table& table, double per_mm) {
+  const auto [nx, ny, nz] = table.size;
+  const auto raise = [&](int i, int j, int k, int sign) {
+    float& own = table.value[table.at(i, j, k)];
+    // The 13 neighbours that this sweep has already seen.
+    for (int dz = -1; dz <= 0; ++dz) {
+      for (int dy = -1; dy <= (dz < 0 ? 1 : 0); ++dy) {
+        for (int dx = -1; dx <= (dz < 0 || dy < 0 ? 1 : -1); ++dx) {
+          const int a = i + sign * dx, b = j + sign * dy, c = k + sign * dz;
+          if (a < 0 || b < 0 || c < 0 || a >= nx || b >= ny || c >= nz) continue;
+          const double way = table.step * std::sqrt(static_cast<double>(dx * dx + dy * dy + dz * dz));
+          own = std::max(own, table.value[table.at(a, b, c)] - static_cast<float>(per_mm * way));
+        }
+      }
+    }
+  };
+  for (int k = 0; k < nz; ++k)
+    for (int j = 0; j < ny; ++j)
+      for (int i = 0; i < nx; ++i) raise(i, j, k, 1);
+  for (int k = nz - 1; k >= 0; --k)
+    for (int j = ny - 1; j >= 0; --j)
+      for (int i = nx - 1; i >= 0; --i) raise(i, j, k, -1);
+}
+
+void check(const StressGrade& grade) {
+  const auto refuse = [](const char* what, const char* where) { throw Error(Code::BadRecipe, what, where); };
+  if (!(grade.least > 0) || !(grade.most >= grade.least) || !std::isfinite(grade.most))
+    refuse("must be above zero, and grade_most no less", "tcs.grade_least");
+  if (!(grade.slope_mm > 0) || !std::isfinite(grade.slope_mm)) refuse("must be above zero", "tcs.grade_depth_mm");
+}
+
+}  // namespace
+
+Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const Shape& body,
+                             const std::function<double(Vec3d)>& stress_mpa, const Context& context) {
+  check(grade);
+  auto table = std::make_shared<Table>();
+  const Vec3d size = box.size();
+  table->step = std::max(grade.slope_mm / 6, std::cbrt(size.x * size.y * size.z / most_entries));
+  table->origin = box.min;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    table->size[axis] = 2 + static_cast<int>(size[static_cast<int>(axis)] / table->step);
+  const auto [nx, ny, nz] = table->size;
+  table->value.assign(table->at(0, 0, nz), 0);
+  std::vector<float> depth(table->value.size());
+  tbb::parallel_for(0, table->size[2], [&](int k) {
+    context.check();
+    std::vector<Vec3d> points;
+    for (int j = 0; j < table->size[1]; ++j)
+      for (int i = 0; i < table->size[0]; ++i) points.push_back(table->place(i, j, k));
+    const std::size_t first = table->at(0, 0, k);
+    std::vector<float> distance(points.size());
+    body.evaluate(points, distance);
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      depth[first + n] = distance[n];
+      // A little outside too, where points just inside read half of their value.
+      if (distance[n] < 2 * table->step) table->value[first + n] = static_cast<float>(stress_mpa(points[n]));
+    }
+  });
+  std::vector<float> inside;
+  for (std::size_t n = 0; n < depth.size(); ++n)
+    if (depth[n] < 0) inside.push_back(table->value[n]);
+  float full = 0;
+  if (!inside.empty()) {
+    const auto place =
+        inside.begin() + static_cast<std::ptrdiff_t>(full_share * static_cast<double>(inside.size() - 1));
+    std::nth_element(inside.begin(), place, inside.end());
+    full = *place;
+  }
+  const double span = grade.most - grade.least;
+  for (float& v : table->value)
+    v = static_cast<float>(grade.least + span * (full > 0 ? std::min(1.0F, v / full) : 0.0F));
+  limit_slope(*table, span / grade.slope_mm);
+  table->steepest = std::sqrt(3.0) * span / grade.slope_mm;
+  return Shape(std::move(table));
+}
+
+}  // namespace fibrolite
