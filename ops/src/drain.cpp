@@ -43,10 +43,14 @@ class Driller {
     c.from = at(spot.foot_mm + h_ * spot.normal);
     c.to = at(spot.foot_mm - (spot.mm + h_) * spot.normal);
     if (c.from <= 0 || c.to < 0 || c.from == c.to) return c;
-    const double radius = 0.5 * params_.hole_mm;
+    const double r = radius(c.to);
     const Vec3d mouth = c.foot_mm + c.length_mm * c.out;
-    c.score = height(mouth) + clutter(c.foot_mm - radius * c.out, radius) + 0.25 * c.length_mm / params_.reach_mm;
-    if (c.to == VoidMap::outside) c.score += unevenness(mouth, c.out, radius) + 0.25 * (1 + dot(c.out, up_));
+    c.score = height(mouth) + clutter(c.foot_mm - r * c.out, r) + 0.25 * c.length_mm / params_.reach_mm;
+    if (c.to == VoidMap::outside) {
+      c.score += unevenness(mouth, c.out, r) + 0.25 * (1 + dot(c.out, up_));
+    } else {
+      c.score += clutter(mouth + r * c.out, r);
+    }
     return c;
   }
   /// From a point in a void straight down to the outside.
@@ -62,11 +66,15 @@ class Driller {
             c.out,
             c.length_mm,
             c.to == VoidMap::outside,
-            {c.foot_mm - h_ * c.out, mouth + h_ * c.out, 0.5 * params_.hole_mm}};
+            {c.foot_mm - h_ * c.out, mouth + h_ * c.out, radius(c.to)}};
   }
   [[nodiscard]] double height(Vec3d p) const { return (dot(p, up_) - low_) / std::max(high_ - low_, h_); }
 
  private:
+  /// Of a hole into this void.
+  [[nodiscard]] double radius(int to) const {
+    return to == VoidMap::outside ? 0.5 * params_.hole_mm : std::max(0.25 * params_.hole_mm, h_);
+  }
   [[nodiscard]] int at(Vec3d p) const {
     const auto near = [&](double v) { return static_cast<int>(std::lround(v / h_)); };
     return voids_.at({near(p.x), near(p.y), near(p.z)});

@@ -15,13 +15,15 @@ namespace {
 
 constexpr int rounds = 3;  // what is mended can make a new gap, or a new void
 
-/// A ball in the middle of each wall or gap, one per voxel.
-void add_balls(const std::vector<Spot>& spots, bool wall, double wall_mm, double voxel_mm,
+/// A ball in the middle of each wall or gap, one per voxel. Magnitudes of a union are understated where its operands
+/// meet, so what closes a gap reaches half a member into both its faces: then it does not look as if it hung by a
+/// thread.
+void add_balls(const std::vector<Spot>& spots, bool wall, const MendParams& params, double voxel_mm,
                std::vector<Capsule>& balls) {
   std::vector<std::pair<std::tuple<long, long, long>, Capsule>> found;
   for (const Spot& spot : spots) {
     const Vec3d middle = spot.foot_mm + (wall ? -0.5 : 0.5) * spot.mm * spot.normal;
-    const double radius = wall ? 0.5 * wall_mm : 0.5 * spot.mm + 0.75 * voxel_mm;
+    const double radius = wall ? 0.5 * params.print.wall_mm : 0.5 * (spot.mm + params.tie.strut_mm) + voxel_mm;
     const auto cell = [&](double v) { return std::lround(v / voxel_mm); };
     found.push_back({{cell(middle.x), cell(middle.y), cell(middle.z)}, {middle, middle, radius}});
   }
@@ -58,8 +60,8 @@ Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const
   for (int round = 0; params.walls_and_gaps && round < rounds; ++round) {
     const Scan found = print_scan(out.tied.solid, lumen, params.print, params.up, context);
     std::vector<Capsule> balls;
-    add_balls(found.walls, true, params.print.wall_mm, voxel, balls);
-    add_balls(found.gaps, false, params.print.wall_mm, voxel, balls);
+    add_balls(found.walls, true, params, voxel, balls);
+    add_balls(found.gaps, false, params, voxel, balls);
     if (balls.empty()) break;
     const Shape thicker = unite({distance_to(out.tied.solid), intersect({b, capsules(balls)})});
     take(out.tied, realize(thicker, body, context), body, params.tie, context);

@@ -43,6 +43,22 @@ void expect_sound(const fs::path& file, double volume_mm3) {
   EXPECT_NEAR(counted.volume_mm3, volume_mm3, 1e-4 * volume_mm3) << file;
 }
 
+TEST(Generate, FixLeavesOnePieceAndNoClosedVoid) {
+  const TempDir folder;
+  run(generate(asset("molar"), {"--infill", "tcs", "-o", folder / "a.stl"}));
+  run(generate(asset("molar"), {"--infill", "tcs", "--fix", "-o", folder / "b.stl"}));
+  const json closed = report_in(folder / "a.report.json"), open = report_in(folder / "b.report.json");
+  EXPECT_EQ(closed["solid"]["cavities"], 1);
+  EXPECT_TRUE(closed["print"]["drains"].empty());
+  EXPECT_EQ(open["solid"]["cavities"], 0);
+  EXPECT_EQ(open["solid"]["pieces"], 1);
+  EXPECT_EQ(open["mesh"]["shells"], 1);
+  EXPECT_EQ(open["print"]["small_gaps"]["places"], 0);
+  ASSERT_EQ(open["print"]["drains"].size(), 1U);
+  EXPECT_TRUE(open["print"]["drains"][0]["outward"]);
+  expect_sound(folder / "b.stl", open["mesh"]["volume_mm3"]);
+}
+
 TEST(Generate, EveryFormatHoldsTheSameSoundMesh) {
   const TempDir folder;
   const Finished finished = run(generate(

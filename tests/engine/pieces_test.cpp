@@ -26,6 +26,19 @@ TEST(Pieces, counts_material_and_cavities_with_their_volumes) {
   EXPECT_LT(solid.distance(found.material[1].sample_mm), 0);
 }
 
+TEST(VoidMap, tells_material_outside_and_each_cavity) {
+  const Solid solid = make(subtract(sphere({0, 0, 0}, 9), unite({sphere({-4, 0, 0}, 2), sphere({4, 0, 0}, 3)})));
+  const VoidMap voids(solid);
+  ASSERT_EQ(voids.cavities().size(), 2U);
+  EXPECT_GT(voids.cavities()[0].voxels, voids.cavities()[1].voxels);
+  EXPECT_EQ(voids.at({16, 0, 0}), 1);  // x = 4 mm: the larger
+  EXPECT_EQ(voids.at({-16, 0, 0}), 2);
+  EXPECT_EQ(voids.at({0, 0, 0}), VoidMap::material);
+  EXPECT_EQ(voids.at({40, 0, 0}), VoidMap::outside);
+  EXPECT_EQ(voids.at({4000, 0, 0}), VoidMap::outside);
+  EXPECT_EQ(VoidMap(Solid()).at({0, 0, 0}), VoidMap::outside);
+}
+
 TEST(Pieces, an_open_tube_has_no_cavity_and_a_plugged_one_has) {
   const Shape wall = subtract(cylinder({0, 0, -8}, {0, 0, 8}, 4), cylinder({0, 0, -9}, {0, 0, 9}, 3));
   EXPECT_EQ(pieces(make(wall)).cavities.size(), 0U);

@@ -374,5 +374,13 @@ TEST(CheckRecipe, NumbersMustFitEachOther) {
   EXPECT_THAT(refused("joint.spacing_mm=0.8"), HasSubstr("joint.spacing_mm"));
 }
 
+TEST(Recipe, ADrainIsAtLeastTwoVoxelsWideOrNone) {
+  const Recipe drained = set(Recipe{}, "print.drain_mm=0.6");
+  EXPECT_NO_THROW(check_recipe(drained, 0.3));
+  EXPECT_THROW(check_recipe(drained, 0.31), Error);
+  EXPECT_NO_THROW(check_recipe(set(Recipe{}, "print.drain_mm=0"), 0.31));
+  EXPECT_FALSE(set(drained, "print.drain_mm=auto").print.drain_mm.has_value());
+}
+
 }  // namespace
 }  // namespace fibrolite

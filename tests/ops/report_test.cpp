@@ -91,6 +91,22 @@ TEST(Report, ShapesOfValues) {
   EXPECT_EQ(json::parse(to_json(Report{}))["parts"], json::array());
 }
 
+TEST(Report, PrintChecksAreThereIfTheyWereMade) {
+  Report report;
+  EXPECT_FALSE(json::parse(to_json(report)).contains("print"));
+  report.print.checked = true;
+  report.print.found.thin_walls = {1, 2, 0.5, 0.25, {{{1, 2, 3}, 0.25, 2}}};
+  report.print.found.node_overhang_mm2 = 7;
+  report.print.drains = {{{4, 5, 6}, {0, 0, -1}, 1.5, true, {{4, 5, 7.5}, {4, 5, 6}, 1}}};
+  const json print = json::parse(to_json(report))["print"];
+  EXPECT_EQ(print["thin_walls"]["worst"][0]["at_mm"], json({1.0, 2.0, 3.0}));
+  EXPECT_EQ(print["thin_walls"]["least_mm"], 0.25);
+  EXPECT_EQ(print["small_gaps"]["places"], 0);
+  EXPECT_EQ(print["overhangs"]["nodes_mm2"], 7);
+  EXPECT_EQ(print["drains"][0]["place_mm"], json({4.0, 5.0, 6.0}));
+  EXPECT_EQ(print["drains"][0]["diameter_mm"], 2);
+}
+
 TEST(Report, LayersAreThereIfSomethingWasSliced) {
   Report report;
   EXPECT_FALSE(json::parse(to_json(report)).contains("slices"));

@@ -26,8 +26,8 @@ struct Drain {
 /// One hole per enclosed void, which is the least there can be: voids with a thin wall between them drain into each
 /// other, and each group of such voids gets one hole to the outside. That is hidden: the place with the least sum of
 /// height (0 the solid's lowest point, 1 its highest), unevenness of the outer surface round the mouth (in radii),
-/// material beside the hole's inner end, half of how far it turns up, and a quarter of its length over the reach. Cost:
-/// O(samples near the surface * reach / voxel); the same answer on any number of threads.
+/// material beside the hole's ends in a void, half of how far it turns up, and a quarter of its length over the reach.
+/// Cost: O(samples near the surface * reach / voxel); the same answer on any number of threads.
 /// @throws Error BadRecipe: a range above; Cancelled.
 [[nodiscard]] std::vector<Drain> drains(const Solid& solid, const DrainParams& params = {},
                                         const Context& context = {});

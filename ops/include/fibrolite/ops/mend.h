@@ -26,9 +26,9 @@ struct Mended {
   std::vector<Drain> drains;
   std::int64_t voids_filled = 0;  ///< Too small for a hole.
 };
-/// A wall is thickened by balls of wall_mm in its middle, a gap closed by balls as wide as the gap, both inside `body`:
-/// what the model itself makes too thin stays. Then voids with less room than a ball of drain_mm are filled and the
-/// others drained, in at most three rounds each. Cost: a scan and a realize per round.
+/// A wall is thickened by balls of wall_mm in its middle, a gap closed by balls that reach tie.strut_mm / 2 into both
+/// its faces, all inside `body`: what the model itself makes too thin stays. Then voids with less room than a ball of
+/// drain_mm are filled and the others drained, in at most three rounds each. Cost: a scan and a realize per round.
 /// @throws Error BadRecipe: as printable() and drains(); Cancelled.
 [[nodiscard]] Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const Context& context = {});
 /// The solid as a function: `whole`, made before any tie, with the ties and with what was mended.
