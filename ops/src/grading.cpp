@@ -95,7 +95,7 @@ Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const S
   check(grade);
   auto table = std::make_shared<Table>();
   const Vec3d size = box.size();
-  table->step = std::max(grade.slope_mm / 6, std::cbrt(size.x * size.y * size.z / most_entries));
+  table->step = std::max(grade.slope_mm / 4, std::cbrt(size.x * size.y * size.z / most_entries));
   table->origin = box.min;
   for (std::size_t axis = 0; axis < 3; ++axis)
     table->size[axis] = 2 + static_cast<int>(size[static_cast<int>(axis)] / table->step);

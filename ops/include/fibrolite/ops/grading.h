@@ -17,7 +17,7 @@ struct StressGrade {
 /// least + (most - least) * stress / full, at most `most`, where the full stress is the one that 95 % of the body's
 /// volume stays below; raised around the places that need it so that it never falls faster than slope_mm allows. It
 /// follows the stresses' course, not their size: twice the load gives the same field. A table with a step of
-/// slope_mm / 6 over `box` (coarser beyond 2 million entries); outside the box the nearest entry counts.
+/// slope_mm / 4 over `box` (coarser beyond 2 million entries); outside the box the nearest entry counts.
 /// `stress_mpa`: any measure of how much a point carries, 0 or more, thread-safe; `body`: negative inside.
 /// lipschitz(): sqrt(3) (most - least) / slope_mm. @throws Error BadRecipe (a range above); Cancelled. Cost: one call
 /// of `stress_mpa` per entry inside. Source: ours.
