@@ -3,6 +3,8 @@
 #include <benchmark/benchmark.h>
 
 #include <array>
+#include <cmath>
+#include <vector>
 
 #include "fibrolite/ops/infill/mfs.h"
 #include "fibrolite/ops/infill/tcs.h"
@@ -67,6 +69,14 @@ Shape membranes() {
   return generate(parts.parts.front(), MfsParams{}, rod, 1.0).shape;
 }
 
+/// Membranes along an arc of 30 mm through the leaf, with a taper or without.
+Shape bent_membranes(const Taper& taper) {
+  std::vector<Vec3d> line;
+  for (int i = 0; i <= 60; ++i) line.push_back({30 * std::cos(0.03 * i - 0.9) - 28, 0, 30 * std::sin(0.03 * i - 0.9)});
+  const MembraneParams wanted{.width_mm = 24, .height_mm = 24};
+  return sweep(synthesize(find_fibres(read_gray(bundled_micrograph())), wanted), Axis::along(line), {}, taper);
+}
+
 void tcs_block(benchmark::State& state) { per_block(state, crystal({})); }
 void tcs_stretched_block(benchmark::State& state) { per_block(state, crystal({.stretch_z = true})); }
 void tcs_any_cell_block(benchmark::State& state) { per_block(state, crystal({.cell_mm = {6, 7, 5}})); }
@@ -76,6 +86,8 @@ void tcs_turned_block(benchmark::State& state) { per_block(state, crystal({.rota
 void tcs_point(benchmark::State& state) { per_point(state, crystal({})); }
 void mfs_block(benchmark::State& state) { per_block(state, membranes()); }
 void mfs_point(benchmark::State& state) { per_point(state, membranes()); }
+void mfs_bent_block(benchmark::State& state) { per_block(state, bent_membranes({})); }
+void mfs_tapered_block(benchmark::State& state) { per_block(state, bent_membranes({{1.2, 1.0, 0.9}, 0.1})); }
 BENCHMARK(tcs_block);
 BENCHMARK(tcs_stretched_block);
 BENCHMARK(tcs_any_cell_block);
@@ -84,6 +96,8 @@ BENCHMARK(tcs_sheet_block);
 BENCHMARK(tcs_turned_block);
 BENCHMARK(tcs_point);
 BENCHMARK(mfs_block);
+BENCHMARK(mfs_bent_block);
+BENCHMARK(mfs_tapered_block);
 BENCHMARK(mfs_point);
 
 }  // namespace

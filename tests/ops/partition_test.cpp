@@ -439,36 +439,5 @@ TEST(Axis, AlongACircleTheTangentIsSquareToTheRadius) {
   EXPECT_NEAR(axis.mean().x, -1, 1e-9) << "the chord of half a circle";
 }
 
-/// The normal plane of each station, from its centre out to the surface: still between its neighbours' planes.
-TEST(Partition, NormalPlanesDoNotCrossInsideALimb) {
-  int planes = 0;
-  for (const char* name : {"bent_tube", "figure", "quadruped", "molar"}) {
-    const Parted p = parted(read_mesh(testing::asset(name)).mesh);
-    const Shape body = distance_to(p.proxy.solid);
-    for (const Candidate& limb : columns(p.partition)) {
-      const Shape inside = intersect({body, p.partition.labels.region(limb.id)});
-      const std::vector<Vec3d>& line = limb.axis.centre_line();
-      const double step = limb.axis.length_mm() / static_cast<double>(line.size() - 1);
-      for (std::size_t k = 1; k + 2 < line.size(); k += 4) {
-        const Vec3d before = normalized(line[k] - line[k - 1]), along = normalized(line[k + 1] - line[k - 1]),
-                    after = normalized(line[k + 2] - line[k]);
-        const Frame frame = frame_along(line[k], along);
-        if (inside(line[k]) >= 0) continue;
-        ++planes;
-        for (int turn = 0; turn < 24; ++turn) {
-          const double a = 2 * std::numbers::pi * turn / 24;
-          for (double r = 0;; r += 0.5 * step) {
-            const Vec3d q = frame.to_world({r * std::cos(a), r * std::sin(a), 0});
-            if (inside(q) >= 0) break;
-            EXPECT_LT(dot(q - line[k + 1], after), 0) << name << ' ' << limb.id << ' ' << k << ' ' << r;
-            EXPECT_GT(dot(q - 0.5 * (line[k - 1] + line[k]), before), 0) << name << ' ' << limb.id << ' ' << k;
-          }
-        }
-      }
-    }
-  }
-  EXPECT_GT(planes, 100);
-}
-
 }  // namespace
 }  // namespace fibrolite

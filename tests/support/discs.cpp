@@ -36,7 +36,8 @@ FloatImage squared_distance_to(const Image<std::uint8_t>& marked) {
     std::size_t k = 0;
     for (int q = 0; q < static_cast<int>(line.size()); ++q) {
       while (k + 1 < from.size() && start[k + 1] < q) ++k;
-      result[static_cast<std::size_t>(q)] = 1.0 * (q - from[k]) * (q - from[k]) + line[static_cast<std::size_t>(from[k])];
+      result[static_cast<std::size_t>(q)] =
+          1.0 * (q - from[k]) * (q - from[k]) + line[static_cast<std::size_t>(from[k])];
     }
     line = result;
   };

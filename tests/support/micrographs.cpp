@@ -93,7 +93,8 @@ GrayImage photograph(std::uint64_t seed, double pitch, int side, double noise, i
     image(x, y) = grey(tone * light + noise * normal(random));
   });
   if (truth != nullptr)
-    *truth = static_cast<int>(std::count_if(pixels.begin(), pixels.end(), [&](int n) { return n > pitch * pitch / 10; }));
+    *truth =
+        static_cast<int>(std::count_if(pixels.begin(), pixels.end(), [&](int n) { return n > pitch * pitch / 10; }));
   return image;
 }
 

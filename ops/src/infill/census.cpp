@@ -12,8 +12,8 @@
 namespace fibrolite {
 namespace {
 
-/// Twice the depth of a membrane's middle, in pixels, where (x, y) is nearest to it: two slopes that meet there or up to
-/// half a pixel beside. 0 elsewhere.
+/// Twice the depth of a membrane's middle, in pixels, where (x, y) is nearest to it: two slopes that meet there or up
+/// to half a pixel beside. 0 elsewhere.
 double thickness_at(const FloatImage& membranes, int x, int y) {
   const auto depth = [&](int i, int j) { return -static_cast<double>(membranes(i, j)); };
   double thickness = std::numeric_limits<double>::infinity();  // straight across is shortest

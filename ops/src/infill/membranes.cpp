@@ -6,15 +6,15 @@
 #include <memory>
 #include <utility>
 
-#include "fibrolite/ops/infill/mfs.h"
 #include "infill/spline.h"
 #include "infill/sweep.h"
+#include "infill/taper.h"
 
 namespace fibrolite {
 namespace {
 
-constexpr double most_slope = 1.035;   // of the image as it is evaluated
-constexpr double of_stations = 1.01;   // 0.08 rad from one to the next add less
+constexpr double most_slope = 1.035;  // of the image as it is evaluated
+constexpr double of_stations = 1.01;  // 0.08 rad from one to the next add less
 
 class Membranes final : public Shape::Function {
  public:
@@ -57,8 +57,8 @@ class Membranes final : public Shape::Function {
     std::array<float, PointBlock::capacity> along;
     sweep_.map(block, u.data(), v.data(), along.data());
     for (std::size_t i = 0; i < count; ++i) {
-      const float scale = scale_at(along[i]);
-      out[i] = divide_ * scaled(at(u[i] / scale, v[i] / scale), scale);
+      const float scale = scale_at(along[i]), shrink = 1 / scale;
+      out[i] = divide_ * scaled(at(shrink * u[i], shrink * v[i]), scale);
     }
   }
 
@@ -82,8 +82,9 @@ class Membranes final : public Shape::Function {
   }
   [[nodiscard]] float scale_at(float along) const {
     const float place = std::clamp(along * per_step_, 0.F, static_cast<float>(scale_.size() - 1));
-    const auto k = std::min(static_cast<std::size_t>(place), scale_.size() - 2);
-    return scale_[k] + (place - static_cast<float>(k)) * (scale_[k + 1] - scale_[k]);
+    const int k = std::min(static_cast<int>(place), static_cast<int>(scale_.size()) - 2);
+    const float* scale = scale_.data() + k;
+    return scale[0] + (place - static_cast<float>(k)) * (scale[1] - scale[0]);
   }
 
   MembraneImage image_;

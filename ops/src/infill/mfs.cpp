@@ -14,6 +14,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
 #include "infill/census.h"
+#include "infill/straighten.h"
 #include "infill/sweep.h"
 #include "infill/taper.h"
 #include "plane_image.h"
@@ -144,8 +145,9 @@ LimbSection limb_section(const Shape& body, const Shape& region, const Frame& fr
 Taper limb_taper(const Part& part, const MfsParams& params, const Shape& body, const Sweep& across,
                  const Extent& extent) {
   TaperLimits limits;
-  limits.least = std::min(1.0, std::max(1 / most_taper, 1.2 * least_fibre_mm(params.wall_mm, params.gap_mm,
-                                                                             params.walls) / params.fibre_mm));
+  limits.least = std::min(
+      1.0,
+      std::max(1 / most_taper, 1.2 * least_fibre_mm(params.wall_mm, params.gap_mm, params.walls) / params.fibre_mm));
   limits.most = most_taper;
   std::vector<LimbSection> sections;
   for (int k = 0; k < taper_sections; ++k)
@@ -174,8 +176,10 @@ std::string mm(double value) {
 Fill generate(const Part& part, const MfsParams& params, const Shape& body, double shell_mm) {
   check(params);
   const double pixel_mm = std::min({params.wall_mm / 4, params.gap_mm / 4, 0.1});
-  const Sweep across(part.axis());
-  const Extent extent = extent_across(part, intersect({body, part.region()}), across);
+  const Shape limb = intersect({body, part.region()});
+  const Axis axis = straightened(part.axis(), limb);
+  const Sweep across(axis);
+  const Extent extent = extent_across(part, limb, across);
 
   // The lumen in five sections of the middle of the part; the middle one is also where fibres are counted.
   const Shape lumen = intersect({offset(body, -shell_mm), part.region()});
@@ -211,7 +215,7 @@ Fill generate(const Part& part, const MfsParams& params, const Shape& body, doub
   wanted.pixel_mm = pixel_mm;
   wanted.seed = mix(params.seed + static_cast<std::uint64_t>(part.id()));
   Fill fill;
-  fill.shape = sweep(synthesize(map, wanted), part.axis(), middle, taper);
+  fill.shape = sweep(synthesize(map, wanted), axis, middle, taper);
   const FineSection section = fine_section(sections.front(), fill.shape, pixel_mm);
   const double least_area = 0.25 * params.wall_mm * params.wall_mm;  // slits at the shell are no fibres
   fill.section = census(section.membranes, pixel_mm, least_area, &section.lumen);

@@ -20,11 +20,11 @@
 namespace fibrolite {
 namespace {
 
-constexpr int max_side_px = 2048;      // larger templates are halved: fibres stay many pixels wide
-constexpr double distance_unit = 64;   // a pixel of distance in the integer height image
+constexpr int max_side_px = 2048;          // larger templates are halved: fibres stay many pixels wide
+constexpr double distance_unit = 64;       // a pixel of distance in the integer height image
 constexpr double least_likeness = 0.1;     // of white noise 0; a photograph buried in noise as strong as itself has 0.3
 constexpr double least_two_levels = 0.68;  // of noise 0.64; fibres that can be told apart have 0.72 or more
-constexpr double saddle_ratio = 0.72;  // a waist wider than this share of the smaller fibre is no border
+constexpr double saddle_ratio = 0.72;      // a waist wider than this share of the smaller fibre is no border
 
 /// 8-bit, no larger than max_side_px, light evened out.
 cv::Mat even_light(const GrayImage& micrograph) {
@@ -175,7 +175,8 @@ FloatImage distance_to_membranes(const LabelImage& label) {
   return distance;
 }
 
-constexpr const char* better_image = "use a sharp cross-section with fibres apart from each other, at least 12 pixels wide";
+constexpr const char* better_image =
+    "use a sharp cross-section with fibres apart from each other, at least 12 pixels wide";
 
 [[noreturn]] void too_few(int found) {
   throw Error(Code::BadInput, "found " + std::to_string(found) + " fibres in the micrograph, at least 4 are needed",

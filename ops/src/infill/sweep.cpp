@@ -252,8 +252,8 @@ double Sweep::curvature_at(double share) const {
   // The sharper of this stretch and its neighbours: a turn is known between stations, not where in between.
   double most = 0;
   for (std::size_t i = k == 0 ? 0 : k - 1; i <= std::min(k + 1, stations_.size() - 2); ++i)
-    most = std::max(most, std::hypot(stations_[i].bend_u, stations_[i].bend_v) /
-                              (stations_[i + 1].at_mm - stations_[i].at_mm));
+    most = std::max(
+        most, std::hypot(stations_[i].bend_u, stations_[i].bend_v) / (stations_[i + 1].at_mm - stations_[i].at_mm));
   return most;
 }
 

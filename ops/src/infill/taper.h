@@ -9,7 +9,8 @@
 
 namespace fibrolite {
 
-/// A limb in one of its normal planes: 0 if that plane does not show the whole of it (cut off from its neighbour there).
+/// A limb in one of its normal planes: 0 if that plane does not show the whole of it (cut off from its neighbour
+/// there).
 struct LimbSection {
   double size_mm = 0;   ///< Radius of a disc of the same area.
   double reach_mm = 0;  ///< Farthest point from the centre line.

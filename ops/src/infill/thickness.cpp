@@ -71,9 +71,9 @@ std::vector<Vec2d> thin_ridges(const FloatImage& e, const Raster& raster, double
 }  // namespace
 
 FloatImage walls_along(std::vector<Segment2d> lines, const Raster& raster, const Thickness& thickness, double far_mm) {
-  // Where the section is shrunk most, a void's core is what lies half a wall and half a gap off the lines: discs of half
-  // a gap about it fill the void, and discs of half a wall fit between any two of them. As the section grows the discs
-  // of the void grow by what the wall would have gained.
+  // Where the section is shrunk most, a void's core is what lies half a wall and half a gap off the lines: discs of
+  // half a gap about it fill the void, and discs of half a wall fit between any two of them. As the section grows the
+  // discs of the void grow by what the wall would have gained.
   const double core_mm = 0.5 * (thickness.wall_mm + thickness.gap_mm) / thickness.least_scale;
   const double void_mm = core_mm - 0.5 * thickness.wall_mm;
   const double least_void_mm = 0.5 * thickness.gap_mm / thickness.least_scale;

@@ -22,10 +22,9 @@ struct Raster {
 };
 
 /// Signed distance to walls along `lines` (mm, negative inside): every wall is wall_mm thick or more, and every void is
-/// a union of discs of gap_mm; what is narrower becomes wall. Voids shrink, never grow: where a neck is filled so thinly
-/// that the filling itself would be no wall, it gets a wall of its own. True in walls and up to gap_mm / 2 off them, at
-/// most the distance elsewhere; at most far_mm.
-/// Cost: O(pixels + length of walls * (far / pixel)^2), parallel.
+/// a union of discs of gap_mm; what is narrower becomes wall. Voids shrink, never grow: where a neck is filled so
+/// thinly that the filling itself would be no wall, it gets a wall of its own. True in walls and up to gap_mm / 2 off
+/// them, at most the distance elsewhere; at most far_mm. Cost: O(pixels + length of walls * (far / pixel)^2), parallel.
 [[nodiscard]] FloatImage walls_along(std::vector<Segment2d> lines, const Raster& raster, const Thickness& thickness,
                                      double far_mm);
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <fstream>
 
+#include "discs.h"
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
-#include "discs.h"
 #include "micrographs.h"
 #include "models.h"
 #include "part_maker.h"
@@ -118,7 +118,8 @@ TEST(Mfs, ATaperChangesNothingInAnEvenLimb) {
   const Fill even = generate(straight_column(6), params, body, 1.0);
   params.taper = true;
   const Fill tapered = generate(straight_column(6), params, body, 1.0);
-  for (double x = -4; x < 4; x += 0.37) EXPECT_NEAR(even.shape({x, 0.4 * x, 20}), tapered.shape({x, 0.4 * x, 20}), 1e-3);
+  for (double x = -4; x < 4; x += 0.37)
+    EXPECT_NEAR(even.shape({x, 0.4 * x, 20}), tapered.shape({x, 0.4 * x, 20}), 1e-3);
 }
 
 TEST(Mfs, ANarrowLumenIsFilledAndSaysSo) {

@@ -129,7 +129,8 @@ TEST(Micrograph, AnImageWithoutStructureIsRefused) {
     return false;
   };
   for (const double sd : {2.0, 10.0, 40.0})
-    for (const int grain : {0, 1, 4, 30}) EXPECT_TRUE(refused(pure_noise(3, 400, 128, sd, grain))) << sd << ' ' << grain;
+    for (const int grain : {0, 1, 4, 30})
+      EXPECT_TRUE(refused(pure_noise(3, 400, 128, sd, grain))) << sd << ' ' << grain;
   Random random(5, "test");
   GrayImage even(400, 400), black_and_white(400, 400), ramp(400, 400), dome(400, 400);
   for (std::uint8_t& p : even.pixels) p = static_cast<std::uint8_t>(random.below(256));
@@ -174,8 +175,8 @@ TEST(Micrograph, ColourInAnyFormatGivesTheSameFibres) {
   for (const char* ending : {".png", ".jpg", ".tif"}) {
     std::vector<std::uint8_t> bytes;
     cv::imencode(ending, pink, bytes);
-    std::ofstream(folder / ending, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()),
-                                                           static_cast<std::streamsize>(bytes.size()));
+    std::ofstream(folder / ending, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     EXPECT_NEAR(find_fibres(read_gray(folder / ending)).fibres, drawn, 0.04 * drawn) << ending;
   }
 }
@@ -372,8 +373,8 @@ GrayImage doubled(const GrayImage& image) {
   for (int y = 0; y < twice.height; ++y)
     for (int x = 0; x < twice.width; ++x) {
       const int i = std::min(x / 2 + (x & 1), image.width - 1), j = std::min(y / 2 + (y & 1), image.height - 1);
-      twice(x, y) = static_cast<std::uint8_t>(
-          (image(x / 2, y / 2) + image(i, y / 2) + image(x / 2, j) + image(i, j) + 2) / 4);
+      twice(x, y) =
+          static_cast<std::uint8_t>((image(x / 2, y / 2) + image(i, y / 2) + image(x / 2, j) + image(i, j) + 2) / 4);
     }
   return twice;
 }

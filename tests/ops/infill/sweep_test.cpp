@@ -231,9 +231,10 @@ Slopes slopes(const Shape& shape, Place&& place) {
         result.steepest = std::max(result.steepest, (std::abs(shape(q) - value) - 2e-6) / norm(p - q));
     }
     const double h = 0.01;
-    const Vec3d gradient = (0.5 / h) * Vec3d{static_cast<double>(shape(p + Vec3d{h, 0, 0}) - shape(p - Vec3d{h, 0, 0})),
-                                             static_cast<double>(shape(p + Vec3d{0, h, 0}) - shape(p - Vec3d{0, h, 0})),
-                                             static_cast<double>(shape(p + Vec3d{0, 0, h}) - shape(p - Vec3d{0, 0, h}))};
+    const Vec3d gradient =
+        (0.5 / h) * Vec3d{static_cast<double>(shape(p + Vec3d{h, 0, 0}) - shape(p - Vec3d{h, 0, 0})),
+                          static_cast<double>(shape(p + Vec3d{0, h, 0}) - shape(p - Vec3d{0, h, 0})),
+                          static_cast<double>(shape(p + Vec3d{0, 0, h}) - shape(p - Vec3d{0, 0, h}))};
     result.steepest = std::max(result.steepest, norm(gradient) - 1e-3);
     if (std::abs(value) < 0.05) result.flattest_at_surface = std::min(result.flattest_at_surface, norm(gradient));
   }
@@ -255,8 +256,7 @@ TEST(Sweep, ADistanceWithinFivePercent) {
   EXPECT_LE(along_line.steepest, 1.05);
   EXPECT_GE(along_line.flattest_at_surface, 0.9) << "blunt within two pixels of the middle of a void of 0.4";
   for (const double ring : {16.0, 25.0, 60.0}) {  // 16: the limb's inner side is at half the radius of its line
-    const Slopes bent =
-        slopes(sweep(muscle(), arc(ring)), [&](Random& random) { return about_arc(random, ring, 8); });
+    const Slopes bent = slopes(sweep(muscle(), arc(ring)), [&](Random& random) { return about_arc(random, ring, 8); });
     EXPECT_LE(bent.steepest, 1.05) << ring;
     EXPECT_GE(bent.flattest_at_surface, 0.9) << ring;
   }
@@ -283,8 +283,7 @@ TEST(Sweep, MembranesAreUnbrokenFromEndToEnd) {
   for (int k = 0; k < length; ++k)
     for (int j = 0; j < side; ++j)
       for (int i = 0; i < side; ++i)
-        open[index(i, j, k)] =
-            value[index(i, j, k)] > 0 && std::hypot(i * h - reach, j * h - reach) < reach ? 1 : 0;
+        open[index(i, j, k)] = value[index(i, j, k)] > 0 && std::hypot(i * h - reach, j * h - reach) < reach ? 1 : 0;
   // Regions of the first section alone, and of all of them.
   const auto regions = [&](int sections) {
     std::vector<std::uint8_t> left = open;

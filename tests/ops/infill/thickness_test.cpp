@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fibrolite/ops/infill/mfs.h"
 #include "discs.h"
+#include "fibrolite/ops/infill/mfs.h"
 #include "infill/spline.h"
 #include "micrographs.h"
 
@@ -28,7 +28,8 @@ TEST(Thickness, DiscsSeeHowThickABarIs) {
 TEST(Thickness, TheVoidBetweenTwoWallsThatMeetEndsInARoundAsWideAsTheGap) {
   // Middles of the walls: y = +-x / 10. A disc of 0.4 fits between the walls where they are 0.6 off the axis.
   const Raster raster{{3, -2}, 0.05, 241, 81};
-  const FloatImage walls = walls_along({{{0, 0}, {40, 4}}, {{0, 0}, {40, -4}}}, raster, {.wall_mm = 0.8, .gap_mm = 0.4}, 2);
+  const FloatImage walls =
+      walls_along({{{0, 0}, {40, 4}}, {{0, 0}, {40, -4}}}, raster, {.wall_mm = 0.8, .gap_mm = 0.4}, 2);
   const auto value = [&](double x, double y) {
     return spline(walls, static_cast<float>((x - 3) / 0.05), static_cast<float>((y + 2) / 0.05));
   };
@@ -51,11 +52,13 @@ TEST(Thickness, NoWallIsThinnerAndNoVoidNarrowerThanAsked) {
   };
   const FibreMap muscle = find_fibres(read_gray(bundled_micrograph())), comb = find_fibres(honeycomb(9, 8, 40, 7)),
                  blobs = find_fibres(photograph(11, 34, 300));
-  const std::vector<Case> cases = {
-      {"muscle", muscle, 2.4, 0.8, 0.4, Walls::Image},      {"muscle, tight", muscle, 1.7, 0.8, 0.5, Walls::Image},
-      {"muscle, wide gap", muscle, 3, 0.4, 1.2, Walls::Image}, {"honeycomb", comb, 2.4, 0.6, 0.6, Walls::Image},
-      {"uneven", blobs, 4, 0.5, 0.8, Walls::Image},         {"muscle, triangles", muscle, 4.15, 0.8, 0.4, Walls::Delaunay},
-      {"uneven, triangles", blobs, 5, 0.8, 0.6, Walls::Delaunay}};
+  const std::vector<Case> cases = {{"muscle", muscle, 2.4, 0.8, 0.4, Walls::Image},
+                                   {"muscle, tight", muscle, 1.7, 0.8, 0.5, Walls::Image},
+                                   {"muscle, wide gap", muscle, 3, 0.4, 1.2, Walls::Image},
+                                   {"honeycomb", comb, 2.4, 0.6, 0.6, Walls::Image},
+                                   {"uneven", blobs, 4, 0.5, 0.8, Walls::Image},
+                                   {"muscle, triangles", muscle, 4.15, 0.8, 0.4, Walls::Delaunay},
+                                   {"uneven, triangles", blobs, 5, 0.8, 0.6, Walls::Delaunay}};
   for (const Case& c : cases)
     for (const std::uint64_t seed : {1, 2, 3}) {
       MembraneParams params;

@@ -26,7 +26,7 @@ struct Fill {
   int free_edges = 0;  ///< Membranes that end in a void of the middle section.
   /// Of a fill made of sticks: visits each stick that may reach into the box, once, from node to node. Else empty.
   std::function<void(const Box3d& box, const std::function<void(const Capsule&)>& visit)> sticks{};
-  double ball_mm = 0;  ///< Diameter of the balls at the nodes of those sticks.
+  double ball_mm = 0;        ///< Diameter of the balls at the nodes of those sticks.
   FibreCensus section{};     ///< Of fibres: the middle section, inside the shell, mm.
   FibreCensus micrograph{};  ///< And the template they were taken from, px.
 };

@@ -23,7 +23,8 @@ struct MfsParams {
   double gap_mm = 0.4;   ///< Least width of a void between membranes; what is narrower becomes membrane.
   /// Delaunay walls are 1.7 times as long as the membranes of the same fibres: for the same mass, 1.7 times fibre_mm.
   Walls walls = Walls::Image;
-  /// Fibres converge where the limb narrows and spread where it widens, by 1.25 at most; membranes keep their thickness.
+  /// Fibres converge where the limb narrows and spread where it widens, by 1.25 at most; membranes keep their
+  /// thickness.
   bool taper = false;
   std::optional<std::filesystem::path> micrograph;  ///< Template image; default: the bundled one.
   std::uint64_t seed = 1;
@@ -43,8 +44,9 @@ struct Taper {
 };
 
 /// The image swept along the axis; its middle lies at `center_mm` of the section (at scale 1), the centre line at
-/// (0, 0). A distance along smooth centre lines whose normal planes do not cross; beyond the image its rim is continued.
-/// Within the limb Lipschitz 1.05 for images of synthesize(); values are divided by what a taper or a ring's twist adds.
+/// (0, 0). A distance along smooth centre lines whose normal planes do not cross; beyond the image its rim is
+/// continued. Within the limb Lipschitz 1.05 for images of synthesize(); values are divided by what a taper or a ring's
+/// twist adds.
 [[nodiscard]] Shape sweep(MembraneImage image, const Axis& axis, Vec2d center_mm = {}, const Taper& taper = {});
 
 }  // namespace fibrolite

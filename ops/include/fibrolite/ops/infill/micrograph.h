@@ -19,8 +19,8 @@ struct FibreMap {
   FibreCensus census{};      ///< px
 };
 /// Segment fibres by watershed (bright fibres, dark membranes, or the reverse: decided by which side is compact).
-/// Uneven light is evened out. @throws Error BadInput: nothing stands out (an even image, noise), or fewer than 4 fibres
-/// found.
+/// Uneven light is evened out. @throws Error BadInput: nothing stands out (an even image, noise), or fewer than 4
+/// fibres found.
 [[nodiscard]] FibreMap find_fibres(const GrayImage& micrograph);
 
 /// Tile-free texture of fibres, larger than the template, by image quilting (Efros & Freeman 2001), rescaled so that
