@@ -6,13 +6,13 @@
 #include "commands.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/hybridize.h"
-#include "fibrolite/ops/picture.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
 #include "job.h"
 #include "options.h"
 #include "summary.h"
+#include "views.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -26,13 +26,14 @@ struct GenerateOptions {
   OutputOptions output;
   std::optional<double> voxel_mm;
   InfillKind infill = InfillKind::Hybrid;
-  std::optional<fs::path> picture, steps;
+  PictureOptions pictures;
+  std::optional<fs::path> steps;
   bool fix = false;
 
   [[nodiscard]] std::vector<fs::path> targets() const {
     std::vector<fs::path> all = output.files;
-    for (const auto& extra : {picture, steps})
-      if (extra) all.push_back(*extra);
+    all.insert(all.end(), pictures.files.begin(), pictures.files.end());
+    if (steps) all.push_back(*steps);
     all.push_back(output.report_path());
     return all;
   }
@@ -94,7 +95,7 @@ void generate(const GenerateOptions& options) {
   // Each thing goes as soon as nothing needs it: at the end only the mesh and its check are in memory.
   Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.75, "fill"));
   model = {};
-  if (!options.picture) hybrid.body = {};
+  if (options.pictures.files.empty()) hybrid.body = {};
   stage("write solid", [&] {
     for (const fs::path& file : options.output.files)
       if (is_vdb(file)) write_vdb(outputs.place(file), {{"solid", hybrid.solid}}, context.part(0.75, 0.78, "write"));
@@ -102,13 +103,16 @@ void generate(const GenerateOptions& options) {
   });
   hybrid.steps.clear();
   const Mesh mesh = stage("surface", [&] { return surface(hybrid.solid, {}, context.part(0.8, 0.88, "surface")); });
-  if (options.picture) {
+  if (const auto& files = options.pictures.files; !files.empty()) {
     stage("picture", [&] {
-      PictureParams view;
-      view.up = params.recipe.verify.up;
-      write_png(outputs.place(*options.picture),
-                picture(mesh, hybrid.solid, colors(hybrid, params.recipe.shell.thickness_mm), view,
-                        context.part(0.88, 0.92, "picture")));
+      const PointColor color = colors(hybrid, params.recipe.shell.thickness_mm);
+      const double each = 0.04 / static_cast<double>(files.size());
+      for (std::size_t i = 0; i < files.size(); ++i) {
+        const double from = 0.88 + each * static_cast<double>(i);
+        const PictureParams view = picture_params(options.pictures.view(i), hybrid, params.recipe);
+        write_png(outputs.place(files[i]),
+                  picture(mesh, hybrid.solid, color, view, context.part(from, from + each, "picture")));
+      }
     });
   }
   hybrid = {};
@@ -135,7 +139,7 @@ void add_generate_command(CLI::App& program) {
   add_voxel(command, options->voxel_mm,
             "Voxel edge (default: the smaller of longest side / 400 and the recipe's thinnest feature / 3)");
   add_options(command, options->recipe);
-  add_file(command, "--picture", options->picture, ".png", "Picture of the solid, cut open");
+  add_pictures(command, options->pictures);
   add_file(command, "--steps", options->steps, ".vdb", "Every step as a named grid");
   command.add_flag("--fix", options->fix, "Mend what the print checks find: thin walls, small gaps, closed voids");
   command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");

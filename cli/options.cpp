@@ -95,12 +95,6 @@ std::string listed(const std::vector<std::string>& words) {
   return all;
 }
 
-void require_ending(const std::string& option, const fs::path& file, const std::vector<std::string>& endings) {
-  const std::string ending = lower(file.extension().string());
-  if (std::find(endings.begin(), endings.end(), ending) == endings.end())
-    refuse(option, file.string(), "its name must end in " + listed(endings));
-}
-
 std::string content_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::error_code error;
@@ -228,6 +222,12 @@ void add_infill(CLI::App& command, InfillKind& kind) {
   add_choice<InfillKind>(
       command, "--infill", choices, [&](InfillKind chosen) { kind = chosen; }, help)
       ->type_name("NAME");
+}
+
+void require_ending(const std::string& option, const fs::path& file, const std::vector<std::string>& endings) {
+  const std::string ending = lower(file.extension().string());
+  if (std::find(endings.begin(), endings.end(), ending) == endings.end())
+    refuse(option, file.string(), "its name must end in " + listed(endings));
 }
 
 void add_file(CLI::App& command, const std::string& name, std::optional<fs::path>& file, const std::string& ending,

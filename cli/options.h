@@ -58,6 +58,9 @@ void add_voxel(CLI::App& command, std::optional<double>& voxel_mm, const std::st
 void add_length(CLI::App& command, const std::string& name, std::optional<double>& length_mm, const std::string& help);
 void add_infill(CLI::App& command, InfillKind& kind);
 [[nodiscard]] std::string_view name_of(InfillKind kind);
+/// @throws UsageError: the file's ending is none of these (lower case, with the dot).
+void require_ending(const std::string& option, const std::filesystem::path& file,
+                    const std::vector<std::string>& endings);
 /// An extra output with one fixed ending.
 void add_file(CLI::App& command, const std::string& name, std::optional<std::filesystem::path>& file,
               const std::string& ending, const std::string& help);

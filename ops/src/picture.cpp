@@ -25,6 +25,8 @@ void check_params(const PictureParams& params) {
   if (norm(params.up) == 0) throw Error(Code::BadRecipe, "the picture's up direction is zero");
   if (!(params.margin >= 0 && params.margin < 0.5))
     throw Error(Code::BadRecipe, "the picture's margin is 0 to below 0.5");
+  if (params.focus_mm && !(*params.focus_mm > 0))
+    throw Error(Code::BadRecipe, "what a picture looks at closely is above 0 mm wide");
 }
 
 /// As many samples per pixel edge as about 150 MB of buffers allow, at most 3.

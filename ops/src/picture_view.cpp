@@ -134,6 +134,11 @@ View choose_view(const Mesh& mesh, const std::optional<CutPlane>& cut, const Pic
     all.include(q);
     if (!cut || cut->side(p) <= 0) kept.include(q);
   }
+  if (params.focus_mm && cut) {
+    const Vec3d p = cut->point, half = *params.focus_mm * Vec3d{1, 1, 1};
+    const Vec3d q{dot(p, view.right), dot(p, view.up), dot(p, view.forward)};
+    kept = {q - half, q + half};
+  }
   const Box3d& frame = kept.empty() ? all : kept;
   if (frame.empty()) return view;
   const double free = 1 - 2 * params.margin;

@@ -19,8 +19,10 @@ struct PictureParams {
   Vec3d up{0, 0, 1};                      ///< Unit.
   /// Cut plane: material on the side the normal points to is taken away, and the picture is taken from there. Default:
   /// vertical, across the smaller horizontal extent, in the middle half of it where most of every colour shows.
-  std::optional<Vec3d> cut_point, cut_normal;
+  std::optional<Vec3d> cut_point{}, cut_normal{};
   bool cut = true;
+  /// If given: only this much about the cut point fills the picture, not all that the cut leaves; > 0.
+  std::optional<double> focus_mm{};
   double margin = 0.05;  ///< Share of the picture left free on each side; 0 to below 0.5.
 };
 /// Colour of the material at a point (by part, shell, joint).
