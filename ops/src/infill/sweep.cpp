@@ -134,35 +134,43 @@ bool Sweep::in_slab(int slab, Vec3d p) const {
 }
 
 void Sweep::map_in_slab(int slab, const float* x, const float* y, const float* z, int count, Places out) const {
-  float *u = out.u, *v = out.v;
-  const Station& station = stations_[static_cast<std::size_t>(std::max(slab, 0))];
-  const Plane& a = planes_[static_cast<std::size_t>(std::max(slab, 0))];
+  // The optimizer takes the loops apart only if it knows that answers overlap no points and no question is asked
+  // inside.
+  const auto k = static_cast<std::size_t>(std::max(slab, 0));
+  const Plane a = planes_[k];
+  const Station& station = stations_[k];
   const auto from = static_cast<float>(station.at_mm);
+  const auto each = [count](const float* __restrict px, const float* __restrict py, const float* __restrict pz,
+                            float* __restrict u, float* __restrict v, float* __restrict along, auto&& place) {
+    for (int i = 0; i < count; ++i) place(px[i], py[i], pz[i], u[i], v[i], along[i]);
+  };
+  std::array<float, PointBlock::capacity> unasked;
+  float* along = out.along != nullptr ? out.along : unasked.data();
   if (slab < 0 || slab == last()) {
-    for (int i = 0; i < count; ++i) {
-      const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
-      u[i] = dx * a.ux + dy * a.uy + dz * a.uz;
-      v[i] = dx * a.vx + dy * a.vy + dz * a.vz;
-      if (out.along != nullptr) out.along[i] = from + dx * a.tx + dy * a.ty + dz * a.tz;
-    }
+    each(x, y, z, out.u, out.v, along, [&](float px, float py, float pz, float& u, float& v, float& way) {
+      const float dx = px - a.cx, dy = py - a.cy, dz = pz - a.cz;
+      u = dx * a.ux + dy * a.uy + dz * a.uz;
+      v = dx * a.vx + dy * a.vy + dz * a.vz;
+      way = from + dx * a.tx + dy * a.ty + dz * a.tz;
+    });
     return;
   }
-  const Plane& b = planes_[static_cast<std::size_t>(slab) + 1];
-  const auto length = static_cast<float>(stations_[static_cast<std::size_t>(slab) + 1].at_mm) - from;
+  const Plane b = planes_[k + 1];
+  const auto length = static_cast<float>(stations_[k + 1].at_mm) - from;
   const auto bend_u = static_cast<float>(0.5 * station.bend_u), bend_v = static_cast<float>(0.5 * station.bend_v);
-  for (int i = 0; i < count; ++i) {
-    const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
-    const float ex = x[i] - b.cx, ey = y[i] - b.cy, ez = z[i] - b.cz;
+  each(x, y, z, out.u, out.v, along, [&](float px, float py, float pz, float& u, float& v, float& way) {
+    const float dx = px - a.cx, dy = py - a.cy, dz = pz - a.cz;
+    const float ex = px - b.cx, ey = py - b.cy, ez = pz - b.cz;
     const float above = std::max(0.F, dx * a.tx + dy * a.ty + dz * a.tz);
     const float below = std::max(0.F, -(ex * b.tx + ey * b.ty + ez * b.tz));
     const float s = above / std::max(above + below, 1e-20F);
     // Each end's frame alone sees the limb bend away, by the sagitta; between them that is (1 - s) * above * bend / 2
     // too much.
     const float sagitta = (1 - s) * above;
-    u[i] = (1 - s) * (dx * a.ux + dy * a.uy + dz * a.uz) + s * (ex * b.ux + ey * b.uy + ez * b.uz) - sagitta * bend_u;
-    v[i] = (1 - s) * (dx * a.vx + dy * a.vy + dz * a.vz) + s * (ex * b.vx + ey * b.vy + ez * b.vz) - sagitta * bend_v;
-    if (out.along != nullptr) out.along[i] = from + s * length;
-  }
+    u = (1 - s) * (dx * a.ux + dy * a.uy + dz * a.uz) + s * (ex * b.ux + ey * b.uy + ez * b.uz) - sagitta * bend_u;
+    v = (1 - s) * (dx * a.vx + dy * a.vy + dz * a.vz) + s * (ex * b.vx + ey * b.vy + ez * b.vz) - sagitta * bend_v;
+    way = from + s * length;
+  });
 }
 
 void Sweep::map(const PointBlock& block, float* u, float* v, float* along) const {
