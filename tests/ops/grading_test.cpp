@@ -35,7 +35,7 @@ TEST(Grading, NeverFallsFasterThanAllowedAndNeverBelowTheNeed) {
   const auto stress = [](Vec3d p) { return std::abs(p.x - 50) < 5 ? 1.0 : 0.0; };
   const Shape factor = thicker_where_stressed(grade, bar, cuboid(bar), stress);
   EXPECT_NEAR(factor({50, 10, 10}), 2, 1e-6);
-  EXPECT_NEAR(factor({60, 10, 10}), 1.5, 0.2);
+  EXPECT_NEAR(factor({60, 10, 10}), 1.5, 0.3);  // the table steps by 2.5 mm
   EXPECT_NEAR(factor({90, 10, 10}), 1, 1e-6);
   Random random(1, "grading", 0);
   const auto point = [&] { return Vec3d{100 * random.uniform(), 20 * random.uniform(), 20 * random.uniform()}; };
