@@ -36,6 +36,10 @@ class Reader {
     if (!json_.is_number_unsigned() || json_.get<std::uint64_t>() > 1000000) refuse("a whole number, 0 or more");
     return json_.get<int>();
   }
+  [[nodiscard]] bool boolean() const {
+    if (!json_.is_boolean()) refuse("true or false");
+    return json_.get<bool>();
+  }
   [[nodiscard]] std::string text() const {
     if (!json_.is_string()) refuse("a name in quotes");
     return json_.get<std::string>();
@@ -167,7 +171,8 @@ LoadCase load_case(const Reader& reader) {
   reader.object(
       {{"name", [&](const Reader& r) { load.name = r.text(); }},
        {"supports", [&](const Reader& r) { r.list([&](const Reader& s) { load.supports.push_back(support(s)); }); }},
-       {"forces", [&](const Reader& r) { r.list([&](const Reader& f) { load.forces.push_back(force(f)); }); }}});
+       {"forces", [&](const Reader& r) { r.list([&](const Reader& f) { load.forces.push_back(force(f)); }); }},
+       {"unplanned", [&](const Reader& r) { load.unplanned = r.boolean(); }}});
   return load;
 }
 
@@ -223,6 +228,7 @@ Json written(const std::vector<LoadCase>& cases) {
     for (const Force& force : load.forces)
       forces.push_back(std::visit([](const auto& f) { return written(f); }, force));
     json.push_back(Json{{"name", load.name}, {"supports", supports}, {"forces", forces}});
+    if (load.unplanned) json.back()["unplanned"] = true;
   }
   return json;
 }

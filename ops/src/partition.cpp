@@ -35,6 +35,12 @@ void check_params(const PartitionParams& p) {
     throw Error(Code::BadRecipe, "the smallest area must be 0 to 0.5 of the surface", "partition.min_area",
                 "try 0.012");
   }
+  if (out_of(p.concentration, 0, 100)) {
+    throw Error(Code::BadRecipe, "the concentration must be 0 to 100", "partition.concentration", "try 1.5");
+  }
+  if (!(p.core_share > 0 && p.core_share <= 2)) {
+    throw Error(Code::BadRecipe, "the share must be above 0, up to 2", "partition.core_share", "try 0.5");
+  }
   if (out_of(p.min_slenderness, 0, 100)) {
     throw Error(Code::BadRecipe, "the least slenderness must be 0 to 100", "partition.min_slenderness", "try 1");
   }

@@ -96,6 +96,19 @@ void read(const Json& json, Walls& value, Range, const Place& place) {
   value = json == "image" ? Walls::Image : Walls::Delaunay;
 }
 
+constexpr std::array<std::pair<PartBy, const char*>, 3> bys{
+    {{PartBy::Shape, "shape"}, {PartBy::Load, "load"}, {PartBy::Both, "both"}}};
+std::string accepts(const PartBy&, Range) { return "\"shape\", \"load\" or \"both\""; }
+Json write(PartBy value) { return bys[static_cast<std::size_t>(value)].second; }
+void read(const Json& json, PartBy& value, Range, const Place& place) {
+  for (const auto& [by, name] : bys)
+    if (json == name) {
+      value = by;
+      return;
+    }
+  place.refuse(json);
+}
+
 std::string accepts(const Bridge&, Range) { return "\"mst\" or \"bbox\""; }
 Json write(Bridge value) { return value == Bridge::Mst ? "mst" : "bbox"; }
 void read(const Json& json, Bridge& value, Range, const Place& place) {
@@ -190,12 +203,18 @@ const std::vector<Field>& table() {
   static const std::vector<Field> rows = {
       field("shell.thickness_mm", &R::shell, &ShellParams::thickness_mm, {0.01, 1000}, "outer wall; 2 voxels or more"),
 
+      field("partition.by", &R::partition, &PartitionParams::by,
+            "columns are limbs by their shape (the paper), cores where the load runs, or both"),
       field("partition.threshold", &R::partition, &PartitionParams::threshold, {0, 1},
             "normalised diameter below which a region is column-like; auto takes the most stable partition"),
       field("partition.min_area", &R::partition, &PartitionParams::min_area, {0, 0.5},
             "regions below this share of the surface join a neighbour"),
       field("partition.min_slenderness", &R::partition, &PartitionParams::min_slenderness, {0, 100},
-            "a limb shorter than this many diameters is no column"),
+            "a limb or core shorter than this many diameters is no column"),
+      field("partition.core_share", &R::partition, &PartitionParams::core_share, {0, 2, true},
+            "section of a core, over one that would carry all of the load at the core's largest stress"),
+      field("partition.concentration", &R::partition, &PartitionParams::concentration, {0, 100},
+            "a core starts where the stress along one direction is this many times the body's mean"),
 
       field("verify.dominance", &R::verify, &VerifyParams::dominance, {1, 1000, true},
             "a column carries at least this many times more stress along its axis than across"),
@@ -239,6 +258,12 @@ const std::vector<Field>& table() {
             "and by this under the shell; tcs.grade_least or more"),
       field("tcs.grade_depth_mm", &R::tcs, &TcsParams::grade_depth_mm, {0.04, 1000},
             "how deep under the shell the change ends; tcs.cell_mm or more"),
+
+      field("gyroid.cell_mm", &R::gyroid, &GyroidParams::cell_mm, {0.04, 1000},
+            "edge of the cubic cell; 4 * gyroid.wall_mm or more"),
+      field("gyroid.wall_mm", &R::gyroid, &GyroidParams::wall_mm, {0.01, 250}, "thickness of walls; 2 voxels or more"),
+      field("gyroid.density", &R::gyroid, &GyroidParams::density, {0, 1},
+            "share of material in a cell: walls get as thick as that takes; auto: as given"),
 
       field("joint.enabled", &R::joint, &JointParams::enabled, "layers and columns where parts meet"),
       field("joint.bridge", &R::joint, &JointParams::bridge,

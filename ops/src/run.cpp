@@ -7,10 +7,31 @@
 #include <numbers>
 
 #include "fibrolite/blocks.h"
+#include "fibrolite/ops/sleeve.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
 
 namespace fibrolite {
+
+Partition find_candidates(const Proxy& proxy, const Recipe& recipe, const VerifyParams& load,
+                          std::vector<StageReport>& stages, const Context& context) {
+  Stopwatch stage(stages);
+  const PartBy by = recipe.partition.by;
+  Partition parts;
+  if (by == PartBy::Load) {
+    parts = undivided(proxy);
+  } else {
+    const DiameterField field =
+        stage("diameter", [&] { return diameter(proxy.surface, {}, context.part(0, 0.4, "diameter")); });
+    parts = stage("partition",
+                  [&] { return partition(proxy, field, recipe.partition, context.part(0.4, 0.6, "partition")); });
+  }
+  if (by == PartBy::Shape) return parts;
+  return stage("cores", [&] {
+    return find_cores(proxy, std::move(parts), core_params(recipe), load, recipe.material,
+                      context.part(0.6, 1, "cores"));
+  });
+}
 
 std::string infill_of(const Part& part, InfillKind run) {
   switch (run) {
@@ -22,6 +43,10 @@ std::string infill_of(const Part& part, InfillKind run) {
       return "mfs";
     case InfillKind::Solid:
       return "solid";
+    case InfillKind::Gyroid:
+      return "gyroid";
+    case InfillKind::Shell:
+      return "shell";
   }
   return {};
 }
@@ -39,6 +64,8 @@ Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& b
   const std::string name = infill_of(part, run);
   if (name == "tcs") return thickness ? generate(part, recipe.tcs, *thickness) : generate(part, recipe.tcs);
   if (name == "mfs") return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
+  if (name == "gyroid") return generate(part, recipe.gyroid);
+  if (name == "shell") return {.shape = nothing()};
   return {.shape = everything()};
 }
 
@@ -54,6 +81,12 @@ std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& in
   for (std::size_t i = 0; i < interfaces.size(); ++i) {
     const Interface& at = interfaces[i];
     const auto a = static_cast<std::size_t>(at.a), b = static_cast<std::size_t>(at.b);
+    if (at.length_mm > 0) {
+      const Shape both = unite({parts.parts[a].region(), parts.parts[b].region()});
+      joints.push_back(sleeve(at, fills[a].shape, fills[b].shape, both, body, recipe.shell.thickness_mm,
+                              recipe.mfs.wall_mm, section_pixel(recipe)));
+      continue;
+    }
     const bool crystal_a = parts.parts[a].kind() == Kind::Bulk, crystal_b = parts.parts[b].kind() == Kind::Bulk;
     joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal_a, crystal_b, member, body,
                           recipe.shell.thickness_mm, recipe.seed, static_cast<int>(i), recipe.joint, context));
