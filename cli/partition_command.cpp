@@ -56,10 +56,20 @@ InterfaceReport interface_report(const Cut& cut) {
   return interface;
 }
 
+InterfaceReport interface_report(const Core& core, const Candidate& candidate) {
+  InterfaceReport interface =
+      interface_report(Cut{.a = core.id, .b = core.host, .frame = core.frame, .radius_mm = core.radius_mm});
+  interface.centroid_mm = candidate.centroid_mm;
+  interface.radius_mm = core.radius_mm;
+  return interface;
+}
+
 void fill_report(Report& report, const Model& model, const Partition& parts) {
   report.model.volume_mm3 = signed_volume(model.mesh);
   for (const Candidate& candidate : parts.candidates) report.parts.push_back(part_report(candidate));
   for (const Cut& cut : parts.cuts) report.interfaces.push_back(interface_report(cut));
+  for (const Core& core : parts.cores)
+    report.interfaces.push_back(interface_report(core, parts.candidates.at(static_cast<std::size_t>(core.id))));
 }
 
 Mesh colored(Mesh mesh, const Partition& parts) {
@@ -124,7 +134,8 @@ void run_partition(const PartitionOptions& options) {
 
 void add_partition_command(CLI::App& program) {
   const auto options = std::make_shared<PartitionOptions>();
-  CLI::App& command = *program.add_subcommand("partition", "Parts by shape only, coloured (.ply) or as grids (.vdb)");
+  CLI::App& command =
+      *program.add_subcommand("partition", "Parts before they are judged, coloured (.ply) or as grids (.vdb)");
   add_options(command, options->model);
   add_options(command, options->output, {".ply", ".vdb"});
   add_voxel(command, options->voxel_mm,

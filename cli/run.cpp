@@ -70,10 +70,8 @@ FoundParts find_parts(const Model& model, const Recipe& recipe, Report& report, 
   FoundParts found;
   found.proxy = stage(
       "proxy", [&] { return make_proxy(model.mesh, {.frame = stance(recipe.verify)}, context.part(0, 0.1, "proxy")); });
-  const DiameterField field =
-      stage("diameter", [&] { return diameter(found.proxy.surface, {}, context.part(0.1, 0.6, "diameter")); });
-  found.partition = stage(
-      "partition", [&] { return partition(found.proxy, field, recipe.partition, context.part(0.6, 1, "partition")); });
+  found.partition =
+      find_candidates(found.proxy, recipe, in_stance(recipe.verify), report.stages, context.part(0.1, 1, "partition"));
   report.warnings.insert(report.warnings.end(), found.partition.notes.begin(), found.partition.notes.end());
   report.threshold = found.partition.threshold;
   report.stable_from = found.partition.stable_from;

@@ -7,7 +7,7 @@ set(fibrolite_config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/fibrolite)
 
 install(TARGETS fibrolite RUNTIME)
 install(TARGETS fibrolite-tetgen RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/fibrolite)
-install(DIRECTORY assets/models assets/textures DESTINATION ${CMAKE_INSTALL_DATADIR}/fibrolite/assets)
+install(DIRECTORY assets/models assets/recipes assets/textures DESTINATION ${CMAKE_INSTALL_DATADIR}/fibrolite/assets)
 install(DIRECTORY LICENSES/ DESTINATION ${CMAKE_INSTALL_DATADIR}/licenses/fibrolite)
 
 install(TARGETS fibrolite_all fibrolite_engine fibrolite_ops EXPORT fibrolite ARCHIVE FILE_SET HEADERS)

@@ -195,6 +195,9 @@ Shape y_branch() {
 /// On its edge, so that a load from above runs along it.
 Shape ring() { return torus(frame_along({}, {0, 1, 0}), 36, 9); }
 
+/// Bulky from every side: its shape says nothing of where a load runs.
+Shape rounded_box() { return rounded_cuboid({{-20, -20, 0}, {20, 20, 40}}, 3); }
+
 struct Model {
   const char* name;
   Shape (*shape)();
@@ -204,8 +207,8 @@ struct Model {
   double longest_mm = 0;         ///< Or scaled to this longest side; 0: as it is.
 };
 
-const std::array<Model, 8>& models() {
-  static const std::array<Model, 8> list{{
+const std::array<Model, 9>& models() {
+  static const std::array<Model, 9> list{{
       {"quadruped", quadruped, {{-60, -26, -4}, {60, 26, 90}}, 0.85, {}, 100},
       {"molar", molar, {{-32, -28, -6}, {32, 28, 90}}, 1.0, Vec3d{50, 40, 80}},
       {"figure", figure, {{-42, -22, -4}, {42, 18, 126}}, 0.8, {}, 120},
@@ -214,6 +217,7 @@ const std::array<Model, 8>& models() {
       {"bent_tube", bent_tube, {{-14, -14, -4}, {70, 14, 96}}, 0.8, {}, 0},
       {"y", y_branch, {{-46, -16, -4}, {46, 16, 104}}, 0.8, {}, 0},
       {"torus", ring, {{-50, -14, -50}, {50, 14, 50}}, 0.9, {}, 0},
+      {"rounded_box", rounded_box, {{-25, -25, -5}, {25, 25, 45}}, 0.8, {}, 0},
   }};
   return list;
 }

@@ -33,9 +33,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     const VerifyParams load = in_stance(recipe.verify);
     const Proxy proxy =
         run("proxy", 0.02, [&](const Context& c) { return make_proxy(model.mesh, {.frame = stand}, c); });
-    const DiameterField field = run("diameter", 0.08, [&](const Context& c) { return diameter(proxy.surface, {}, c); });
-    const Partition cut =
-        run("partition", 0.12, [&](const Context& c) { return partition(proxy, field, recipe.partition, c); });
+    const Partition cut = find_candidates(proxy, recipe, load, report.stages, run.part("partition", 0.12));
     const Verification verified =
         run("verify", 0.35, [&](const Context& c) { return verify(proxy, cut, load, recipe.material, c); });
     report_decisions(cut, verified, report);

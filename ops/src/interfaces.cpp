@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fibrolite/error.h"
+#include "fibrolite/ops/sleeve.h"
 #include "plane_image.h"
 
 namespace fibrolite {
@@ -90,6 +91,7 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
 
 double demand_n(const Interface& section, const Labels& labels, const Shape& body,
                 const std::function<double(Vec3d, Vec3d)>& traction_mpa) {
+  if (section.length_mm > 0) return mantle_demand_n(section, labels, body, traction_mpa);
   constexpr int across = 36;  // a disc of this many pixels has about a thousand
   const double pixel = 2 * section.radius_mm / across;
   const PlaneGrid grid = PlaneGrid::about(section.frame, section.radius_mm, pixel, 1);
@@ -117,6 +119,7 @@ std::vector<Interface> interfaces(const Parts& parts, const Shape& body, double 
     for (Interface& section : sections_of(column_first(parts, cut) ? cut : turned(cut), parts.labels, body, pixel_mm))
       all.push_back(section);
   }
+  for (const Core& core : parts.cores) all.push_back(mantle_of(core, parts.labels, body, pixel_mm));
   std::sort(all.begin(), all.end(), [](const Interface& p, const Interface& q) {
     const auto key = [](const Interface& s) {
       return std::tuple(s.a, s.b, s.frame.origin.x, s.frame.origin.y, s.frame.origin.z);

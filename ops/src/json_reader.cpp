@@ -30,6 +30,11 @@ int JsonReader::count() const {
   return json_.get<int>();
 }
 
+bool JsonReader::boolean() const {
+  if (!json_.is_boolean()) refuse("true or false");
+  return json_.get<bool>();
+}
+
 std::string JsonReader::text() const {
   if (!json_.is_string()) refuse("a name in quotes");
   return json_.get<std::string>();

@@ -26,6 +26,7 @@ class JsonReader {
   [[nodiscard]] double number() const;
   [[nodiscard]] double positive() const;
   [[nodiscard]] int count() const;
+  [[nodiscard]] bool boolean() const;
   [[nodiscard]] std::string text() const;
   [[nodiscard]] Rgb color() const;
   [[nodiscard]] Vec3d vector(const std::string& accepts = "[x, y, z]") const;

@@ -98,30 +98,63 @@ struct Labels::Impl {
         visit(block.labels[l], trilinear(block.phi.data() + l * nodes_per_block, at));
     }
   };
+  // What a core takes from a stored label.
+  struct Carved {
+    Shape mantle;
+    int host = 0;  // stored label
+    int name = 0;
+  };
   std::shared_ptr<const Fields> fields;  // none: one label everywhere
   std::vector<int> name;                 // of each stored label
   int count = 1;
   std::optional<Frame> frame{};  // whose coordinates the fields are given in; none: the world's
+  std::vector<Carved> carved{};
 
   [[nodiscard]] int label(Vec3d p) const;
+  [[nodiscard]] int carved_from(int stored, Vec3d p) const;
 };
 
+/// The name of a point of a stored label.
+int Labels::Impl::carved_from(int stored, Vec3d p) const {
+  for (const Carved& core : carved)
+    if (core.host == stored && core.mantle(p) < 0) return core.name;
+  return name[static_cast<std::size_t>(stored)];
+}
+
 int Labels::Impl::label(Vec3d p) const {
-  if (!fields) return 0;
-  const Place at = fields->place(frame ? frame->to_local(p) : p);
-  int best = 0;
+  if (!fields && carved.empty()) return 0;
+  if (frame) p = frame->to_local(p);
+  if (!fields) return carved_from(0, p);
+  const Place at = fields->place(p);
+  int best = 0, best_stored = 0;
   float best_phi = far_mm;
   fields->each_label(fields->blocks[at.block], at, [&](std::uint16_t stored, float phi) {
     const int named = name[stored];
     if (phi < best_phi || (phi == best_phi && named < best)) {
       best_phi = phi;
       best = named;
+      best_stored = stored;
     }
   });
-  return best;
+  return carved.empty() ? best : carved_from(best_stored, p);
 }
 
 namespace {
+
+/// Inside a core; never exactly zero, so that every point has one owner.
+struct Mantle final : Shape::Function {
+  explicit Mantle(Shape s) : solid(std::move(s)) {}
+  void evaluate(const PointBlock& block, float* out) const override {
+    solid.evaluate(block, out);
+    for (int i = 0; i < block.count; ++i)
+      if (out[i] == 0) out[i] = 1e-6F;
+  }
+  [[nodiscard]] Interval bound(const Box3d& box) const override {
+    const Interval b = solid.bound(box);
+    return {b.lo, std::max(b.hi, 1e-6F)};
+  }
+  Shape solid;
+};
 
 // p_i = (phi_i - min over the others) / 2; a tie belongs to the lower name, as in Labels::label().
 class RegionFunction final : public Shape::Function {
@@ -273,7 +306,7 @@ Block make_block(const LabelSamples& s, int bi, int bj, int bk) {
 
 }  // namespace
 
-Labels::Labels() : impl_(std::make_shared<Impl>(Impl{nullptr, {0}, 1, {}})) {}
+Labels::Labels() : impl_(std::make_shared<Impl>(Impl{nullptr, {0}, 1, {}, {}})) {}
 Labels::Labels(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 
 int Labels::count() const { return impl_->count; }
@@ -284,9 +317,38 @@ Shape Labels::region(int i) const {
     throw Error(Code::Internal, "there is no part " + std::to_string(i), "Labels::region",
                 "ask for 0 to " + std::to_string(impl_->count - 1));
   }
-  if (!impl_->fields || impl_->count == 1) return everything();
-  Shape region(std::make_shared<RegionFunction>(impl_, i));
+  if (impl_->count == 1) return everything();
+  // Of a stored label's name; of a name that is a core's alone: of nothing.
+  const auto stored = [&](const std::shared_ptr<const Impl>& impl, int named) {
+    if (std::find(impl->name.begin(), impl->name.end(), named) == impl->name.end()) return nothing();
+    return impl->fields ? Shape(std::make_shared<RegionFunction>(impl, named)) : everything();
+  };
+  Shape region = stored(impl_, i);
+  if (!impl_->carved.empty()) {
+    // Hosts by their stored labels: what was merged with one of them gives nothing to the core.
+    const auto own = std::make_shared<Impl>(*impl_);
+    for (std::size_t l = 0; l < own->name.size(); ++l) own->name[l] = static_cast<int>(l);
+    own->count = static_cast<int>(own->name.size());
+    for (const Impl::Carved& core : impl_->carved) {
+      const int host = impl_->name[static_cast<std::size_t>(core.host)];
+      if ((core.name == i) == (host == i)) continue;
+      const Shape piece = impl_->fields ? intersect({stored(own, core.host), core.mantle}) : core.mantle;
+      region = core.name == i ? unite({region, piece}) : subtract(region, piece);
+    }
+  }
   return impl_->frame ? fibrolite::placed(std::move(region), *impl_->frame) : region;
+}
+
+Labels Labels::carved(const std::vector<Core>& cores) const {
+  auto impl = std::make_shared<Impl>(*impl_);
+  for (const Core& core : cores) {
+    if (core.id != impl->count || core.host >= static_cast<int>(impl->name.size()))
+      throw Error(Code::Internal, "cores are numbered on from the labels", "Labels::carved");
+    const Vec3d from = core.frame.origin, to = from + core.length_mm * core.frame.z;
+    impl->carved.push_back(
+        {Shape(std::make_shared<Mantle>(cylinder(from, to, core.radius_mm))), core.host, impl->count++});
+  }
+  return Labels(std::move(impl));
 }
 
 Labels Labels::merged(const std::vector<int>& part_of_candidate) const {
@@ -299,6 +361,8 @@ Labels Labels::merged(const std::vector<int>& part_of_candidate) const {
   impl->frame = impl_->frame;
   impl->count = 1 + *std::max_element(part_of_candidate.begin(), part_of_candidate.end());
   for (const int old : impl_->name) impl->name.push_back(part_of_candidate[static_cast<std::size_t>(old)]);
+  impl->carved = impl_->carved;
+  for (Impl::Carved& core : impl->carved) core.name = part_of_candidate[static_cast<std::size_t>(core.name)];
   return Labels(std::move(impl));
 }
 

@@ -153,6 +153,8 @@ void check_loads(const std::vector<LoadCase>& cases) {
     for (std::size_t k = 0; k < load.forces.size(); ++k)
       std::visit([&](const auto& force) { check.force(force, indexed("forces", k)); }, load.forces[k]);
   }
+  if (!cases.empty() && std::all_of(cases.begin(), cases.end(), [](const LoadCase& c) { return c.unplanned; }))
+    throw Error(Code::BadRecipe, "every load case is unplanned", "loads", "let one of them decide about the parts");
 }
 
 std::string color_text(Rgb color) {

@@ -96,7 +96,8 @@ LoadCase load_case(const Reader& reader) {
   reader.object(
       {{"name", [&](const Reader& r) { load.name = r.text(); }},
        {"supports", [&](const Reader& r) { r.list([&](const Reader& s) { load.supports.push_back(support(s)); }); }},
-       {"forces", [&](const Reader& r) { r.list([&](const Reader& f) { load.forces.push_back(force(f)); }); }}});
+       {"forces", [&](const Reader& r) { r.list([&](const Reader& f) { load.forces.push_back(force(f)); }); }},
+       {"unplanned", [&](const Reader& r) { load.unplanned = r.boolean(); }}});
   return load;
 }
 
@@ -151,6 +152,7 @@ Json written(const std::vector<LoadCase>& cases) {
     for (const Force& force : load.forces)
       forces.push_back(std::visit([](const auto& f) { return written(f); }, force));
     json.push_back(Json{{"name", load.name}, {"supports", supports}, {"forces", forces}});
+    if (load.unplanned) json.back()["unplanned"] = true;
   }
   return json;
 }

@@ -32,6 +32,10 @@ const char* name(PartInfill infill) {
       return "tcs";
     case PartInfill::Solid:
       return "solid";
+    case PartInfill::Gyroid:
+      return "gyroid";
+    case PartInfill::Shell:
+      return "shell";
   }
   return "";
 }

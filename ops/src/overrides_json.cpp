@@ -10,9 +10,10 @@ using Json = nlohmann::ordered_json;
 using Reader = JsonReader;
 
 PartInfill infill(const Reader& reader) {
-  for (const PartInfill one : {PartInfill::Mfs, PartInfill::Tcs, PartInfill::Solid})
+  for (const PartInfill one :
+       {PartInfill::Mfs, PartInfill::Tcs, PartInfill::Solid, PartInfill::Gyroid, PartInfill::Shell})
     if (reader.is(name(one))) return one;
-  reader.refuse("\"mfs\", \"tcs\" or \"solid\"");
+  reader.refuse("\"mfs\", \"tcs\", \"solid\", \"gyroid\" or \"shell\"");
 }
 
 Overrides::PartChoice part_choice(const Reader& reader) {

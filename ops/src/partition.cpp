@@ -36,6 +36,12 @@ void check_params(const PartitionParams& p) {
     throw Error(Code::BadRecipe, "the smallest area must be 0 to 0.5 of the surface", "partition.min_area",
                 "try 0.012");
   }
+  if (out_of(p.concentration, 0, 100)) {
+    throw Error(Code::BadRecipe, "the concentration must be 0 to 100", "partition.concentration", "try 1.5");
+  }
+  if (!(p.core_share > 0 && p.core_share <= 2)) {
+    throw Error(Code::BadRecipe, "the share must be above 0, up to 2", "partition.core_share", "try 0.5");
+  }
   if (out_of(p.min_slenderness, 0, 100)) {
     throw Error(Code::BadRecipe, "the least slenderness must be 0 to 100", "partition.min_slenderness", "try 1");
   }
@@ -356,13 +362,6 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
     name[static_cast<std::size_t>(described[i].piece)] = static_cast<int>(i);
     result.candidates.push_back(std::move(described[i].candidate));
   }
-  for (const Overrides::PartChoice& named : params.overrides.parts) {
-    if (const auto last = static_cast<int>(result.candidates.size()) - 1; named.id > last) {
-      throw Error(Code::BadRecipe, "there is no part " + std::to_string(named.id), "partition.overrides.parts",
-                  "use 0 to " + std::to_string(last) + "; fibrolite partition shows them");
-    }
-    result.candidates[static_cast<std::size_t>(named.id)].chosen = named.infill;
-  }
   for (std::size_t c = 0; c < pieces.cuts.size(); ++c) {
     const auto& side = pieces.sides[c];
     result.cuts.push_back({name[static_cast<std::size_t>(side[0])], name[static_cast<std::size_t>(side[1])],
@@ -372,6 +371,16 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   if (pieces.count > 1) result.labels = make_labels(make_label_samples(anatomy, pieces, name));
   context.progress(1);
   return result;
+}
+
+void choose_infills(Partition& partition, const Overrides& overrides) {
+  for (const Overrides::PartChoice& named : overrides.parts) {
+    if (const auto last = static_cast<int>(partition.candidates.size()) - 1; named.id > last) {
+      throw Error(Code::BadRecipe, "there is no part " + std::to_string(named.id), "partition.overrides.parts",
+                  "use 0 to " + std::to_string(last) + "; fibrolite partition shows them");
+    }
+    partition.candidates[static_cast<std::size_t>(named.id)].chosen = named.infill;
+  }
 }
 
 }  // namespace fibrolite

@@ -20,7 +20,20 @@ double predict_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, 
   const double sticks = 3.15 * (16 * t.stick_mm * 0.433 * cell + 8 * t.ball_mm * t.ball_mm) / (cell * cell * cell);
   const double tcs = t.form == TcsForm::Sticks ? sticks : (t.form == TcsForm::Sheet ? 2 : 1) * 3.84 / cell;
   const double mfs = 4 / recipe.mfs.fibre_mm;
-  const double per_mm3 = infill == InfillKind::Solid ? 0 : infill == InfillKind::Tcs ? tcs : std::max(tcs, mfs);
+  const auto per_mm3_of = [&] {
+    switch (infill) {
+      case InfillKind::Solid:
+      case InfillKind::Shell:
+        return 0.0;
+      case InfillKind::Tcs:
+        return tcs;
+      case InfillKind::Gyroid:
+        return 2 * 3.09 / recipe.gyroid.cell_mm;
+      default:
+        return std::max(tcs, mfs);
+    }
+  };
+  const double per_mm3 = per_mm3_of();
   const double faces_mm2 = surface_mm2 * (infill == InfillKind::Solid ? 1 : 2) + per_mm3 * volume_mm3;
   // Leaves are 8 voxels wide and the band 6: a surface fills about two voxels of leaf for each of its band.
   const double solid_voxels = 12 * faces_mm2 / (h * h);

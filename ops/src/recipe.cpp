@@ -59,6 +59,8 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   const bool hybrid = infill == InfillKind::Hybrid;
   if (hybrid || infill == InfillKind::Tcs) list.push_back({member_key(recipe.tcs), members(recipe.tcs).least_mm});
   if (hybrid || infill == InfillKind::Mfs) list.push_back({"mfs.wall_mm", recipe.mfs.wall_mm});
+  if (infill == InfillKind::Gyroid)
+    list.push_back({recipe.gyroid.density ? "gyroid.density" : "gyroid.wall_mm", sized(recipe.gyroid).wall_mm});
   if (hybrid && recipe.joint.enabled) {
     list.push_back({"joint.layer_mm", recipe.joint.layer_mm});
     list.push_back({"joint.column_mm", recipe.joint.column_mm});
@@ -138,6 +140,11 @@ Recipe preset(std::string_view name) {
               "did you mean " + nearest_name(name, preset_names()) + "?");
 }
 
+CoreParams core_params(const Recipe& recipe) {
+  return {recipe.partition.concentration, recipe.partition.core_share, recipe.partition.min_slenderness,
+          2 * (recipe.mfs.fibre_mm + recipe.mfs.wall_mm)};
+}
+
 double thinnest_mm(const Recipe& recipe, InfillKind infill) {
   double thinnest = std::numeric_limits<double>::infinity();
   for (const Feature& feature : features(recipe, infill)) thinnest = std::min(thinnest, feature.mm);
@@ -152,6 +159,7 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   if (infill == InfillKind::Tcs && recipe.tcs.grade == TcsGrade::Stress)
     unfit("tcs.grade is stress, which only a hybrid run knows", "recipe", "use --infill hybrid, or tcs.grade=surface");
   if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
+  if (infill == InfillKind::Gyroid) (void)density(recipe.gyroid);
   if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);
 
   const double drain_mm = recipe.print.drain_mm.value_or(0);
@@ -164,7 +172,7 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   for (const Feature& feature : features(recipe, infill))
     if (feature.mm < 2 * voxel_mm * rounding)
       unfit(std::string(feature.key)
-                .append(feature.key == std::string_view("tcs.density") ? " makes members of " : " is ")
+                .append(std::string_view(feature.key).ends_with(".density") ? " makes members of " : " is ")
                 .append(number_text(feature.mm))
                 .append(" mm, thinner than 2 voxels"),
             "voxel " + number_text(voxel_mm) + " mm",

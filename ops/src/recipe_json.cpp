@@ -92,6 +92,7 @@ void read(const Json& json, std::optional<std::filesystem::path>& value, Range, 
 
 // The words of an enumeration, in the order of its enumerators.
 constexpr std::array<const char*, 2> words(Walls) { return {"image", "delaunay"}; }
+constexpr std::array<const char*, 3> words(PartBy) { return {"shape", "load", "both"}; }
 constexpr std::array<const char*, 2> words(Bridge) { return {"mst", "bbox"}; }
 constexpr std::array<const char*, 3> words(TcsForm) { return {"sticks", "network", "sheet"}; }
 constexpr std::array<const char*, 3> words(TcsGrade) { return {"none", "surface", "stress"}; }
@@ -193,12 +194,18 @@ const std::vector<Field>& table() {
   static const std::vector<Field> rows = {
       field("shell.thickness_mm", &R::shell, &ShellParams::thickness_mm, {0.01, 1000}, "outer wall; 2 voxels or more"),
 
+      field("partition.by", &R::partition, &PartitionParams::by,
+            "columns are limbs by their shape (the paper), cores where the load runs, or both"),
       field("partition.threshold", &R::partition, &PartitionParams::threshold, {0, 1},
             "normalised diameter below which a region is column-like; auto takes the most stable partition"),
       field("partition.min_area", &R::partition, &PartitionParams::min_area, {0, 0.5},
             "regions below this share of the surface join a neighbour"),
       field("partition.min_slenderness", &R::partition, &PartitionParams::min_slenderness, {0, 100},
-            "a limb shorter than this many diameters is no column"),
+            "a limb or core shorter than this many diameters is no column"),
+      field("partition.core_share", &R::partition, &PartitionParams::core_share, {0, 2, true},
+            "section of a core, over one that would carry all of the load at the core's largest stress"),
+      field("partition.concentration", &R::partition, &PartitionParams::concentration, {0, 100},
+            "a core starts where the stress along one direction is this many times the body's mean"),
       field("partition.overrides", &R::partition, &PartitionParams::overrides,
             "infill of single parts, cuts of your own, regions that stay solid"),
 
@@ -250,6 +257,12 @@ const std::vector<Field>& table() {
             "and by this under the shell, or where most is carried; tcs.grade_least or more"),
       field("tcs.grade_depth_mm", &R::tcs, &TcsParams::grade_depth_mm, {0.04, 1000},
             "within what the one becomes the other; tcs.cell_mm or more"),
+
+      field("gyroid.cell_mm", &R::gyroid, &GyroidParams::cell_mm, {0.04, 1000},
+            "edge of the cubic cell; 4 * gyroid.wall_mm or more"),
+      field("gyroid.wall_mm", &R::gyroid, &GyroidParams::wall_mm, {0.01, 250}, "thickness of walls; 2 voxels or more"),
+      field("gyroid.density", &R::gyroid, &GyroidParams::density, {0, 1},
+            "share of material in a cell: walls get as thick as that takes; auto: as given"),
 
       field("joint.enabled", &R::joint, &JointParams::enabled, "layers and columns where parts meet"),
       field("joint.bridge", &R::joint, &JointParams::bridge,

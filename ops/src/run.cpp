@@ -8,10 +8,34 @@
 
 #include "fibrolite/blocks.h"
 #include "fibrolite/ops/grading.h"
+#include "fibrolite/ops/sleeve.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
 
 namespace fibrolite {
+
+Partition find_candidates(const Proxy& proxy, const Recipe& recipe, const VerifyParams& load,
+                          std::vector<StageReport>& stages, const Context& context) {
+  Stopwatch stage(stages);
+  const PartBy by = recipe.partition.by;
+  Partition parts;
+  if (by == PartBy::Load) {
+    parts = undivided(proxy);
+  } else {
+    const DiameterField field =
+        stage("diameter", [&] { return diameter(proxy.surface, {}, context.part(0, 0.4, "diameter")); });
+    parts = stage("partition",
+                  [&] { return partition(proxy, field, recipe.partition, context.part(0.4, 0.6, "partition")); });
+  }
+  if (by != PartBy::Shape) {
+    parts = stage("cores", [&] {
+      return find_cores(proxy, std::move(parts), core_params(recipe), load, recipe.material,
+                        context.part(0.6, 1, "cores"));
+    });
+  }
+  choose_infills(parts, recipe.partition.overrides);
+  return parts;
+}
 
 PartInfill infill_of(const Part& part, InfillKind run) {
   switch (run) {
@@ -23,6 +47,10 @@ PartInfill infill_of(const Part& part, InfillKind run) {
       return PartInfill::Mfs;
     case InfillKind::Solid:
       break;
+    case InfillKind::Gyroid:
+      return PartInfill::Gyroid;
+    case InfillKind::Shell:
+      return PartInfill::Shell;
   }
   return PartInfill::Solid;
 }
@@ -50,6 +78,10 @@ Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& b
       return thickness ? generate(part, recipe.tcs, *thickness) : generate(part, recipe.tcs);
     case PartInfill::Mfs:
       return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
+    case PartInfill::Gyroid:
+      return generate(part, recipe.gyroid);
+    case PartInfill::Shell:
+      return {.shape = nothing()};
     case PartInfill::Solid:
       break;
   }
@@ -68,6 +100,12 @@ std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& in
   for (std::size_t i = 0; i < interfaces.size(); ++i) {
     const Interface& at = interfaces[i];
     const auto a = static_cast<std::size_t>(at.a), b = static_cast<std::size_t>(at.b);
+    if (at.length_mm > 0) {
+      const Shape both = unite({parts.parts[a].region(), parts.parts[b].region()});
+      joints.push_back(sleeve(at, fills[a].shape, fills[b].shape, both, body, recipe.shell.thickness_mm,
+                              recipe.mfs.wall_mm, section_pixel(recipe)));
+      continue;
+    }
     const auto crystal = [&](std::size_t part) {
       return infill_of(parts.parts[part], InfillKind::Hybrid) == PartInfill::Tcs;
     };

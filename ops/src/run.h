@@ -23,10 +23,15 @@ class Run {
   Run(Report& report, const Context& context) : watch_(report.stages), context_(context) {}
   template <class Work>
   auto operator()(const char* name, double until, Work&& work) {
-    const Context part = context_.part(from_, until, name);
+    const Context mine = part(name, until);
+    return watch_(name, [&] { return work(mine); });
+  }
+  /// For what times its own stages.
+  Context part(const char* name, double until) {
+    const Context mine = context_.part(from_, until, name);
     from_ = until;
     context_.check();
-    return watch_(name, [&] { return work(part); });
+    return mine;
   }
 
  private:

@@ -21,6 +21,10 @@ Vec3d turned(const Frame& frame, Vec3d direction) {
   return direction.x * frame.x + direction.y * frame.y + direction.z * frame.z;
 }
 
+Frame placed(const Frame& f, const Frame& frame) {
+  return {frame.to_world(f.origin), turned(frame, f.x), turned(frame, f.y), turned(frame, f.z)};
+}
+
 template <class Map>
 Box3d mapped(const Box3d& box, Map&& map) {
   Box3d result;
@@ -60,9 +64,13 @@ Axis placed(const Axis& axis, const Frame& frame) {
 }
 
 Cut placed(Cut cut, const Frame& frame) {
-  cut.frame = {frame.to_world(cut.frame.origin), turned(frame, cut.frame.x), turned(frame, cut.frame.y),
-               turned(frame, cut.frame.z)};
+  cut.frame = placed(cut.frame, frame);
   return cut;
+}
+
+Core placed(Core core, const Frame& frame) {
+  core.frame = placed(core.frame, frame);
+  return core;
 }
 
 Partition placed(Partition partition, const Frame& frame) {
@@ -71,6 +79,7 @@ Partition placed(Partition partition, const Frame& frame) {
     candidate.axis = placed(candidate.axis, frame);
   }
   for (Cut& cut : partition.cuts) cut = placed(cut, frame);
+  for (Core& core : partition.cores) core = placed(core, frame);
   partition.labels = partition.labels.placed(frame);
   return partition;
 }
@@ -79,6 +88,7 @@ Parts placed(const Parts& parts, const Frame& frame) {
   Parts result;
   result.labels = parts.labels.placed(frame);
   for (const Cut& cut : parts.cuts) result.cuts.push_back(placed(cut, frame));
+  for (const Core& core : parts.cores) result.cores.push_back(placed(core, frame));
   for (const Part& part : parts.parts) {
     PartStress stress = part.stress();
     for (CaseStress& c : stress.cases) c.principal_direction = turned(frame, c.principal_direction);

@@ -12,95 +12,20 @@
 #include <tuple>
 #include <utility>
 
-#include "applied_load.h"
+#include "body_solve.h"
 #include "component_stress.h"
-#include "elasticity.h"
 #include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
 #include "fibrolite/ops/tetrahedralize.h"
 #include "fibrolite/ops/text.h"
-#include "locate.h"
 #include "part_maker.h"
-#include "solve_cases.h"
-#include "voxel_tets.h"
 
 namespace fibrolite {
 namespace {
 
-void check_params(const VerifyParams& p) {
-  const auto require = [](bool holds, const char* key, const char* range) {
-    if (!holds) throw Error(Code::BadRecipe, std::string("verify.") + key + " must be " + range, "recipe");
-  };
-  require(p.dominance > 1 && std::isfinite(p.dominance), "dominance", "above 1");
-  require(p.unloaded >= 0 && p.unloaded < 1, "unloaded", "from 0 to below 1");
-  require(p.load_n > 0 && std::isfinite(p.load_n), "load_n", "above 0");
-  require(std::isfinite(p.azimuth_deg), "azimuth_deg", "a number");
-  require(p.support_share > 0 && p.support_share < 0.5, "support_share", "between 0 and 0.5");
-  require(p.triangles >= 500 && p.triangles <= 50000, "triangles", "from 500 to 50000");
-  require(norm(p.up) > 0 && std::isfinite(norm(p.up)), "up", "a direction");
-}
-
-/// What both levels share: the loads, the material.
-struct Setting {
-  Material material;
-  double voxel_mm;
-  std::vector<LoadCase> cases;
-  std::vector<AppliedLoad> loads;  // the same, found on the body
-};
-
-struct Model {
-  TetMesh mesh;
-  std::vector<HeldCase> cases;
-  std::vector<fem::Solution> solutions;  // one per load case
-};
-
-/// The solved body and the way to a place in it.
-struct Whole {
-  explicit Whole(Model solved) : model(std::move(solved)), locator(model.mesh) {}
-  Whole(const Whole&) = delete;
-  Whole& operator=(const Whole&) = delete;
-
-  [[nodiscard]] double traction_mpa(Vec3d p, Vec3d n) const {
-    const std::uint32_t tet = locator.find(p).tet;
-    double most = 0;
-    for (const fem::Solution& s : model.solutions) {
-      const fem::Stress& t = s.centroid_stress[tet];
-      most = std::max(most, norm(Vec3d{t[0] * n.x + t[3] * n.y + t[5] * n.z, t[3] * n.x + t[1] * n.y + t[4] * n.z,
-                                       t[5] * n.x + t[4] * n.y + t[2] * n.z}));
-    }
-    return most;
-  }
-
-  [[nodiscard]] double von_mises_mpa(Vec3d p) const {
-    const std::uint32_t tet = locator.find(p).tet;
-    double most = 0;
-    for (const fem::Solution& s : model.solutions) most = std::max(most, von_mises(s.centroid_stress[tet]));
-    return most;
-  }
-
-  const Model model;
-  const fem::Locator locator;
-};
-
-/// Stage 1: the whole body on a coarse mesh.
-Model solve_body(TetMesh mesh, Setting& setting, const LoadSetting& how, const Context& context) {
-  std::vector<HeldCase> cases;
-  for (std::size_t c = 0; c < setting.cases.size(); ++c) {
-    const AppliedLoad& load = setting.loads.emplace_back(setting.cases, c, mesh, how);
-    HeldCase& held =
-        cases.emplace_back(HeldCase{load.held_in(), {}, {load.forces_n(mesh, [](Vec3d, Vec3d) { return true; }), {}}});
-    const auto own = load.held(mesh);
-    for (std::uint32_t node = 0; node < own.size(); ++node)
-      for (int axis = 0; axis < 3; ++axis)
-        if (own[node][static_cast<std::size_t>(axis)]) held.fixed.push_back({node, axis});
-  }
-  auto solutions = solve_cases(mesh, setting.material, cases, context);
-  return {std::move(mesh), std::move(cases), std::move(solutions)};
-}
-
 /// Stage 2: a candidate on its own mesh. On its cut faces it follows the body's coarse displacements.
-Model solve_component(TetMesh mesh, const Model& body, const fem::Locator& locator, const Partition& partition, int id,
-                      const Setting& setting, const Context& context) {
+SolvedMesh solve_component(TetMesh mesh, const SolvedMesh& body, const fem::Locator& locator,
+                           const Partition& partition, int id, const LoadedSetting& setting, const Context& context) {
   std::vector<float> distance(mesh.nodes.size());
   partition.labels.region(id).evaluate(mesh.nodes, distance);
   std::vector<bool> on_cut(mesh.nodes.size(), false);
@@ -165,8 +90,8 @@ struct Verdict {
   std::string reason;
 };
 
-void measure(Verdict& verdict, const Model& model, const std::vector<std::uint32_t>& tets, const Axis& axis,
-             const Setting& setting, bool world_axes) {
+void measure(Verdict& verdict, const SolvedMesh& model, const std::vector<std::uint32_t>& tets, const Axis& axis,
+             const LoadedSetting& setting, bool world_axes) {
   for (std::size_t c = 0; c < model.solutions.size(); ++c) {
     const std::vector<fem::Stress>& stress = model.solutions[c].centroid_stress;
     const MeanStress mean =
@@ -232,6 +157,10 @@ std::vector<std::size_t> merge_bulk(const Partition& partition, const std::vecto
     if (cut.kept || partition.candidates[a].chosen || partition.candidates[b].chosen) continue;
     if (verdicts[a].kind == Kind::Bulk && verdicts[b].kind == Kind::Bulk) sets.join(a, b);
   }
+  for (const Core& core : partition.cores) {
+    const auto id = static_cast<std::uint32_t>(core.id), host = static_cast<std::uint32_t>(core.host);
+    if (verdicts[id].kind == Kind::Bulk && verdicts[host].kind == Kind::Bulk) sets.join(id, host);
+  }
   std::vector<std::size_t> group;
   for (std::uint32_t i = 0; i < sets.size(); ++i) group.push_back(sets.root(i));
   return group;
@@ -277,6 +206,11 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
     cut.b = result.part_of_candidate[static_cast<std::size_t>(cut.b)];
     if (cut.a != cut.b) result.parts.cuts.push_back(cut);
   }
+  for (Core core : partition.cores) {
+    core.id = result.part_of_candidate[static_cast<std::size_t>(core.id)];
+    core.host = result.part_of_candidate[static_cast<std::size_t>(core.host)];
+    if (core.id != core.host) result.parts.cores.push_back(core);
+  }
   const std::vector<PartGeometry> geometry = part_geometry(proxy, result.parts.labels);
   for (std::size_t id = 0; id < drafts.size(); ++id) {
     const Draft& draft = drafts[id];
@@ -303,7 +237,7 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
 }
 
 /// What was solved for the whole body, with everything that a reader of files wants to know.
-StressField stress_field(const Model& body, const Setting& setting, const Labels& labels) {
+StressField stress_field(const SolvedMesh& body, const LoadedSetting& setting, const Labels& labels) {
   StressField field{body.mesh, {}, setting.material, {}, {}};
   for (const auto& n : body.mesh.tets)
     field.part.push_back(labels.label(
@@ -321,7 +255,7 @@ StressField stress_field(const Model& body, const Setting& setting, const Labels
   return field;
 }
 
-void account(Verification& result, const Model& model, const Setting& setting) {
+void account(Verification& result, const SolvedMesh& model, const LoadedSetting& setting) {
   result.tets += static_cast<std::int64_t>(model.mesh.tets.size());
   result.dof += 3 * static_cast<std::int64_t>(model.mesh.nodes.size());
   for (std::size_t c = 0; c < model.solutions.size(); ++c) {
@@ -355,60 +289,24 @@ Extracted extract_component(const Proxy& proxy, const Partition& partition, int 
   }
 }
 
-/// The whole body as tetrahedra: TetGen's where it can, else the staircase of a coarse lattice, which never fails.
-TetMesh extract_body(const Proxy& proxy, int triangles, std::vector<std::string>& notes, const Context& context) {
-  try {
-    return extract(proxy, everything(), {.max_surface_triangles = triangles}, context);
-  } catch (const Error& error) {
-    if (error.code() != Code::SolverFailed) throw;
-    notes.push_back(std::string("the body is analysed on a coarse lattice of cubes: ") + error.what());
-    return voxel_tetrahedra(distance_to(proxy.solid), proxy.solid.bounds_mm(), proxy.solid.volume_mm3());
-  }
-}
-
 }  // namespace
 
-std::vector<LoadCase> load_cases(const VerifyParams& params) {
-  if (!params.loads.empty()) return params.loads;
-  Support foot;
-  foot.where.lowest = EndShare{.share = params.support_share};
-  TotalForce force{.newton = params.load_n};
-  force.where.seen_from = Direction{Direction::Of::Up, {}};
-  force.where.box_mm = params.load_box_mm;
-  TotalForce slanted = force;
-  slanted.direction = {Direction::Of::Slanted, {}};
-  return {{"from above", {foot}, {force}}, {"at 45 degrees", {foot}, {slanted}}};
-}
-
-Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& given, const Material& material,
-                    const Context& context) {
-  check_params(given);
+Verification verify(const Proxy& proxy, const Partition& partition, const VerifyParams& params,
+                    const Material& material, const Context& context) {
+  check_params(params);
   check_material(material);
-  check_loads(given.loads);
-  VerifyParams params = given;
-  params.up = normalized(given.up);
-  const double voxel = proxy.solid.grid().voxel_mm;
-  const bool own = !params.loads.empty();
-  Setting setting{material, voxel, load_cases(params), {}};
-  const LoadSetting how{.up = params.up,
-                        .azimuth_deg = params.azimuth_deg,
-                        .material = material,
-                        .tolerance_mm = 0.5 * voxel,  // that far the simplified surface may lie off
-                        .reach_mm = 2 * voxel,
-                        .labels = partition.labels,
-                        .frame = proxy.frame,
-                        .key = own ? "loads" : "verify"};
+  check_loads(params.loads);
   const std::size_t count = partition.candidates.size();
   const bool alone = count == 1;
 
   Verification result;
   // All meshes at once: the body's own, and one for each candidate.
   std::vector<Extracted> extracted(count);
-  std::optional<TetMesh> body_mesh;
+  std::optional<TetMesh> whole_mesh;
   std::atomic<int> done = 0;
   tbb::parallel_for(std::size_t{0}, alone ? std::size_t{1} : count + 1, [&](std::size_t job) {
     if (job == 0) {
-      body_mesh = extract_body(proxy, params.triangles, result.notes, context.part(0, 0, "verify"));
+      whole_mesh = body_mesh(proxy, params.triangles, result.notes, context.part(0, 0, "verify"));
     } else {
       extracted[job - 1] = extract_component(proxy, partition, static_cast<int>(job - 1), params.triangles,
                                              context.part(0, 0, "verify"));
@@ -416,9 +314,10 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
     context.progress(0.4 * ++done / static_cast<double>(count + 1));
   });
 
-  const auto whole =
-      std::make_shared<const Whole>(solve_body(std::move(*body_mesh), setting, how, context.part(0.4, 0.65, "verify")));
-  const Model& body = whole->model;
+  const std::shared_ptr<const SolvedBody> whole =
+      solve_body(proxy, std::move(*whole_mesh), partition.labels, params, material, context.part(0.4, 0.65, "verify"));
+  const LoadedSetting& setting = whole->setting;
+  const SolvedMesh& body = whole->model;
   const fem::Locator& locator = whole->locator;
   result.traction_mpa = [whole](Vec3d p, Vec3d n) { return whole->traction_mpa(p, n); };
   result.von_mises_mpa = [whole](Vec3d p) { return whole->von_mises_mpa(p); };
@@ -431,7 +330,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   }
 
   std::vector<Verdict> verdicts(count);
-  std::vector<std::optional<Model>> components(count);
+  std::vector<std::optional<SolvedMesh>> components(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
     const auto id = static_cast<int>(i);
     const Candidate& candidate = partition.candidates[i];

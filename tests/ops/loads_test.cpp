@@ -369,6 +369,13 @@ TEST(Loads, BadCasesAreRefusedBeforeThereIsABody) {
   EXPECT_THAT(message({bad}), HasSubstr("seen_from is for forces"));
 }
 
+TEST(Loads, OneCaseAtLeastDecides) {
+  std::vector<LoadCase> cases = load_preset("stand");
+  EXPECT_NO_THROW(check_loads(cases));
+  cases.front().unplanned = true;
+  EXPECT_THROW(check_loads(cases), Error);
+}
+
 TEST(Loads, PresetsAreWhatTheirNamesSay) {
   EXPECT_EQ(load_preset_names(), (std::vector<std::string>{"paper-verify", "paper-compare", "stand"}));
   EXPECT_TRUE(load_preset("paper-verify").empty());

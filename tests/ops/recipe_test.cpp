@@ -108,6 +108,26 @@ TEST(Recipe, ThresholdIsAutoOrANumber) {
               HasSubstr("partition.threshold cannot be \"atuo\""));
 }
 
+TEST(Recipe, PartsAreFoundByShapeLoadOrBoth) {
+  EXPECT_EQ(Recipe{}.partition.by, PartBy::Shape);
+  const Recipe recipe = parse_recipe(
+      R"({"partition": {"by": "load", "core_share": 0.4}, "mfs": {"fibre_mm": 3, "wall_mm": 0.5},
+          "gyroid": {"cell_mm": 9, "density": 0.2},
+          "loads": [{"name": "a", "supports": [{"where": {"lowest": {}}}], "forces": [{"gravity": "down"}]},
+                    {"name": "b", "supports": [{"where": {"lowest": {}}}], "forces": [{"gravity": "up"}],
+                     "unplanned": true}]})",
+      Recipe{}, "x");
+  EXPECT_EQ(recipe.partition.by, PartBy::Load);
+  EXPECT_FALSE(recipe.verify.loads.at(0).unplanned);
+  EXPECT_TRUE(recipe.verify.loads.at(1).unplanned);
+  EXPECT_EQ(core_params(recipe).share, 0.4);
+  EXPECT_EQ(core_params(recipe).least_mm, 7);  // two fibres and the walls on either side
+  EXPECT_EQ(recipe.gyroid.density, 0.2);
+  EXPECT_EQ(to_json(parse_recipe(to_json(recipe), Recipe{}, "printed")), to_json(recipe));
+  EXPECT_EQ(set(recipe, "partition.by=both").partition.by, PartBy::Both);
+  EXPECT_THAT(refusal_of_set("partition.by=form"), HasSubstr("\"shape\", \"load\" or \"both\""));
+}
+
 TEST(Recipe, CrystalsHaveAFormACellAndADensity) {
   const Recipe recipe = parse_recipe(
       R"({"tcs": {"form": "sheet", "cell_mm": [5, 6, 7.5], "density": 0.25, "grade": "surface"}})", Recipe{}, "x");

@@ -62,8 +62,8 @@ TEST(Report, HasEveryKeyOfSchemaOne) {
   for (const char* key : {"id", "kind", "infill", "volume_mm3", "infill_volume_mm3", "fibres", "centroid_mm", "axis",
                           "diameter_mm", "mean_stress_mpa", "dominance", "reason"})
     EXPECT_TRUE(report.at("parts").at(0).contains(key)) << key;
-  for (const char* key : {"parts", "centroid_mm", "normal", "area_mm2", "regions_before", "regions_after", "columns",
-                          "contact_area_mm2", "capacity_over_demand"})
+  for (const char* key : {"parts", "centroid_mm", "normal", "border", "area_mm2", "regions_before", "regions_after",
+                          "columns", "contact_area_mm2", "capacity_over_demand"})
     EXPECT_TRUE(report.at("interfaces").at(0).contains(key)) << key;
   for (const char* key : {"volume_mm3", "fill_ratio", "mass_g", "pieces", "cavities", "cavity_volume_mm3", "dangling",
                           "unreached", "active_voxels", "voxel_mm"})

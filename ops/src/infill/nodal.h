@@ -1,24 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The D nodal approximation, and true distances to its level sets. Private to the crystal.
+// Nodal approximations of minimal surfaces, and true distances to their level sets. Private to the infills.
 #pragma once
 
-#include <memory>
 #include <vector>
 
-#include "fibrolite/ops/infill/tcs.h"
+#include "fibrolite/ops/infill/cell_edges.h"
+#include "fibrolite/shape.h"
 
 namespace fibrolite {
 
-/// D(x, y, z) = cos X cos Y cos Z + sin X sin Y sin Z, X = 2 pi x / cell: 1 at the nodes of the crystal, 0 on the
-/// membrane, sqrt(1/2) half way along the bonds. Lattice coordinates, mm.
+/// A minimal surface is about where one of these is zero. X = 2 pi x / cell.
+enum class Surface {
+  D,  ///< cos X cos Y cos Z + sin X sin Y sin Z: 1 at the nodes of the crystal, sqrt(1/2) half way along the bonds.
+  Gyroid,  ///< sin X cos Y + sin Y cos Z + sin Z cos X.
+};
+
+/// Lattice coordinates, mm.
 struct Nodal {
-  explicit Nodal(const CellEdges& cell);
+  Nodal(Surface surface, const CellEdges& cell);
   struct Value {
     double d;
     Vec3d gradient;
   };
   [[nodiscard]] Value operator()(Vec3d p) const;
 
+  Surface of;
   Vec3d wave;  // 2 pi / cell
 };
 
@@ -31,24 +37,32 @@ struct Nodal {
 /// Share of space where D > level.
 [[nodiscard]] double network_density(double level);
 /// Area of the membrane in one cell, mm2.
-[[nodiscard]] double membrane_mm2(const CellEdges& cell);
+[[nodiscard]] double membrane_mm2(Surface surface, const CellEdges& cell);
+/// Share of space within half a wall of the membrane, by Weyl's tube formula: area times thickness, less what the
+/// curvature takes. `area_mm2`: membrane_mm2(), so that a search need not measure it again.
+[[nodiscard]] double sheet_density(Surface surface, const CellEdges& cell, double wall_mm, double area_mm2);
 
-/// Distance to D = level, negative where D is above it, sampled at 64 places along the cell's edges, linear between.
-/// The lattice maps onto itself by half a cell along any two axes, so a quarter of the cell, a brick, holds it all.
+/// Distance to a level, negative where the function is above it, sampled at 64 places along the cell's edges, linear
+/// between. D maps onto itself by half a cell along any two axes, so a quarter of the cell, a brick, holds it all; of a
+/// gyroid the brick is the cell.
 class DistanceTable {
  public:
-  static constexpr int side = 32;  // samples along x and y of the brick, twice as many along z
+  static constexpr int side = 64;  // samples along an edge of the cell
   /// Of the table; a distance itself has 1. Near the surface it is below 1.05; where two of its sides are equally near,
   /// linear steps may be steeper.
   static constexpr double lipschitz = 1.2;
 
-  DistanceTable(const CellEdges& cell, double level);
+  DistanceTable(Surface surface, const CellEdges& cell, double level);
   /// Lattice coordinates shifted by `shift`.
   void evaluate(const PointBlock& block, Vec3d shift, float* out) const;
 
  private:
-  std::vector<float> distance_;  // (side + 1) x (side + 1) x (2 side + 1): rims are copies, so that no index wraps
+  std::vector<float> distance_;  // one more along each edge of the brick: rims are copies, so that no index wraps
   Vec3d per_cell_;
+  Surface surface_;
 };
+
+/// Both sides of the membrane, equally thick; lattice coordinates shifted by `shift`.
+[[nodiscard]] Shape sheet(Surface surface, const CellEdges& cell, double wall_mm, Vec3d shift);
 
 }  // namespace fibrolite

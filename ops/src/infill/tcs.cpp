@@ -20,24 +20,10 @@ namespace {
 
 /// One side of a level set.
 struct Network final : Shape::Function {
-  Network(const CellEdges& cell, double level, Vec3d shift_mm) : table(cell, level), shift(shift_mm) {}
+  Network(const CellEdges& cell, double level, Vec3d shift_mm) : table(Surface::D, cell, level), shift(shift_mm) {}
   void evaluate(const PointBlock& block, float* out) const override { table.evaluate(block, shift, out); }
   [[nodiscard]] double lipschitz() const override { return DistanceTable::lipschitz; }
   DistanceTable table;
-  Vec3d shift;
-};
-
-/// Both sides of the membrane, equally thick.
-struct Sheet final : Shape::Function {
-  Sheet(const CellEdges& cell, double wall_mm, Vec3d shift_mm)
-      : table(cell, 0), half(static_cast<float>(0.5 * wall_mm)), shift(shift_mm) {}
-  void evaluate(const PointBlock& block, float* out) const override {
-    table.evaluate(block, shift, out);
-    for (int i = 0; i < block.count; ++i) out[i] = std::abs(out[i]) - half;
-  }
-  [[nodiscard]] double lipschitz() const override { return DistanceTable::lipschitz; }
-  DistanceTable table;
-  float half;
   Vec3d shift;
 };
 
@@ -152,16 +138,9 @@ Shape in_lattice(const TcsParams& p, Vec3d shift) {
     case TcsForm::Network:
       return Shape(std::make_shared<const Network>(cell, neck_level(cell, p.stick_mm), shift));
     case TcsForm::Sheet:
-      return Shape(std::make_shared<const Sheet>(cell, p.wall_mm, shift));
+      return sheet(Surface::D, cell, p.wall_mm, shift);
   }
   return nothing();
-}
-
-/// Of a sheet by Weyl's tube formula: area times thickness, less what the curvature takes. The membrane has an Euler
-/// number of -16 in a cell (genus 3 in the smallest cell, a quarter of the cube), whatever its edges.
-double sheet_density(const CellEdges& cell, double wall_mm, double area_mm2) {
-  const double curvature = 2 * std::numbers::pi * -16;
-  return (area_mm2 * wall_mm + curvature * wall_mm * wall_mm * wall_mm / 12) / (cell.x * cell.y * cell.z);
 }
 
 /// Of balls and sticks, by sampling a brick of the cell (see DistanceTable).
@@ -192,7 +171,7 @@ double measured(const TcsParams& p, double membrane) {
     case TcsForm::Network:
       return network_density(neck_level(cell_of(p), p.stick_mm));
     case TcsForm::Sheet:
-      return sheet_density(cell_of(p), p.wall_mm, membrane);
+      return sheet_density(Surface::D, cell_of(p), p.wall_mm, membrane);
   }
   return 0;
 }
@@ -283,7 +262,7 @@ MemberRange members(const TcsParams& params) {
 double density(const TcsParams& params) {
   const TcsParams p = sized(params);
   check(p);
-  return measured(p, p.form == TcsForm::Sheet ? membrane_mm2(cell_of(p)) : 0);
+  return measured(p, p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0);
 }
 
 TcsParams sized(const TcsParams& params) {
@@ -292,7 +271,7 @@ TcsParams sized(const TcsParams& params) {
   p.density.reset();
   check_cell(p);
   const double wanted = *params.density;
-  const double area = p.form == TcsForm::Sheet ? membrane_mm2(cell_of(p)) : 0;
+  const double area = p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0;
   const auto of = [&](double scale) { return measured(scaled(p, scale), area); };
   // The thickest members a cell may have, and the thinnest worth a name; density rises with thickness.
   double high = p.cell_mm.least() / cell_per_member(p.form) / members(p).most_mm, low = 0.04 * high;

@@ -42,6 +42,10 @@ struct Hybrid {
   Shape printed;
   StressField field;  ///< If recipe.verify.keep_field, of a hybrid.
 };
+/// The candidates by recipe.partition.by: limbs by shape, cores by load, or both. `load`: as the proxy stands
+/// (in_stance()). Its stages are timed into `stages`. @throws Error of partition() and find_cores().
+[[nodiscard]] Partition find_candidates(const Proxy& proxy, const Recipe& recipe, const VerifyParams& load,
+                                        std::vector<StageReport>& stages, const Context& context = {});
 /// Model -> printed solid. Fills in everything of `report` but the mesh block.
 /// @throws Error of every stage. Cost: see docs/performance.md.
 [[nodiscard]] Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report,

@@ -12,12 +12,14 @@
 
 namespace fibrolite {
 
-/// One connected section of the body in a cut plane between two parts.
+/// One connected section of the body in a cut plane between two parts; or the mantle of a core (sleeve.h).
 struct Interface {
   int a = 0, b = 0;      ///< Part ids; the frame's z axis points from a into b. If one is a column, it is a.
   Frame frame;           ///< Origin at the section's centroid.
   double radius_mm = 0;  ///< Of the disc that covers the section.
   double area_mm2 = 0;   ///< Of the body's section.
+  /// Above 0: a cylinder of radius_mm about the frame's z axis, from its origin so far along it; a is inside.
+  double length_mm = 0;
   /// Of a section that other pairs of parts share: it reaches as far as these say that a lies beside b.
   std::optional<Labels> within{};
 

@@ -83,6 +83,8 @@ struct LoadCase {
   std::string name;  ///< Not empty, and no other case's.
   std::vector<Support> supports;
   std::vector<Force> forces;  ///< They act together.
+  /// Parts are decided without it; only the strength of the finished solid is measured under it, too.
+  bool unplanned = false;
 };
 
 /// What a selection found on a body.

@@ -12,7 +12,7 @@
 namespace fibrolite {
 
 /// What fills a part.
-enum class PartInfill { Mfs, Tcs, Solid };
+enum class PartInfill { Mfs, Tcs, Solid, Gyroid, Shell };  ///< Shell: nothing inside.
 [[nodiscard]] const char* name(PartInfill infill);
 
 /// Flat-ended, between the centres of its end faces.

@@ -69,8 +69,9 @@ class Part {
 /// Every point of the body belongs to exactly one part; parts[i].id() == i.
 struct Parts {
   std::vector<Part> parts;
-  Labels labels;          ///< By part id.
-  std::vector<Cut> cuts;  ///< Between different parts, by part id.
+  Labels labels;              ///< By part id.
+  std::vector<Cut> cuts;      ///< Between different parts, by part id.
+  std::vector<Core> cores{};  ///< Those that are columns; id and host by part id.
 };
 
 }  // namespace fibrolite

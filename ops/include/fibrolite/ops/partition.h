@@ -23,6 +23,14 @@ struct Cut {
   bool shared = false;   ///< Other pairs meet in the same section: it counts only where a lies beside b.
 };
 
+/// A straight core cut out of a candidate: a cylinder about the z axis of `frame`, from its origin. Its ends lie beyond
+/// the body's surface.
+struct Core {
+  int id = 0, host = 0;  ///< Its own candidate, and the one it is cut out of.
+  Frame frame;
+  double radius_mm = 0, length_mm = 0;
+};
+
 /// The axis of a limb: a unit field and a centre line, from its interface (or one end) to its tip.
 class Axis {
  public:
@@ -59,6 +67,8 @@ class Labels {
   /// The same points, candidates renamed by `part_of_candidate` (several may get one name; borders between them
   /// vanish).
   [[nodiscard]] Labels merged(const std::vector<int>& part_of_candidate) const;
+  /// The same labels, less what each core takes from its host. Ids of cores go on where the labels end, in order.
+  [[nodiscard]] Labels carved(const std::vector<Core>& cores) const;
   /// These are labels of a frame's coordinates: the same in the world's.
   [[nodiscard]] Labels placed(const Frame& frame) const;
 
@@ -78,24 +88,40 @@ struct Candidate {
   std::optional<PartInfill> chosen{};  ///< The user's own choice; such a candidate stays a part of its own.
 };
 
+/// What parts are found by.
+enum class PartBy {
+  Shape,  ///< The paper's: columns stand out by their diameter.
+  Load,   ///< Cores where the load runs (find_cores()), out of one piece.
+  Both,   ///< Shape, then cores in what is bulky.
+};
 struct PartitionParams {
+  PartBy by = PartBy::Shape;
   std::optional<double>
       threshold;                 ///< nsdf below this is column-like, 0 to 1; absent: auto, the most stable partition.
   double min_area = 0.012;       ///< Regions below this share of the surface join a neighbour; 0 to 0.5.
-  double min_slenderness = 1.0;  ///< A limb shorter than this many diameters is no column.
-  Overrides overrides{};         ///< Its cuts take the place of the threshold.
+  double min_slenderness = 1.0;  ///< A limb, or a core, shorter than this many diameters is no column.
+  /// A core starts where the stress along one direction is this many times the body's mean; 0 to 100.
+  double concentration = 1.5;
+  /// Section of a core, over one that would carry all of the load at the core's largest stress; above 0, up to 2. More
+  /// carries more along the core, and leaves less for what the rest has to carry.
+  double core_share = 0.7;
+  Overrides overrides{};  ///< Its cuts take the place of the threshold.
 };
 struct Partition {
   std::vector<Candidate> candidates;  ///< Sorted by id; at least one.
   std::vector<Cut> cuts;
+  std::vector<Core> cores;  ///< Their candidates are the last ones.
   Labels labels;
   double threshold = 0;                   ///< The one used.
   double stable_from = 0, stable_to = 0;  ///< Range of thresholds that give the same partition (auto only).
   std::vector<std::string> notes;
 };
-/// @throws Error BadRecipe (a range above; an override that meets no section, or names a candidate that is not there).
+/// @throws Error BadRecipe (a range above; a cut of the user's that meets no section).
 /// Cost: a few seconds for 15 k faces. Source: paper Sec. 4.1; choice of threshold ours.
 [[nodiscard]] Partition partition(const Proxy& proxy, const DiameterField& field, const PartitionParams& params = {},
                                   const Context& context = {});
+
+/// Gives each candidate that the overrides name its infill. @throws Error BadRecipe: there is no such candidate.
+void choose_infills(Partition& partition, const Overrides& overrides);
 
 }  // namespace fibrolite

@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "fibrolite/ops/diameter.h"
+#include "fibrolite/ops/infill/gyroid.h"
 #include "fibrolite/ops/infill/infill.h"
 #include "fibrolite/ops/infill/mfs.h"
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/joint.h"
+#include "fibrolite/ops/load_cores.h"
 #include "fibrolite/ops/loads.h"
 #include "fibrolite/ops/material.h"
 #include "fibrolite/ops/partition.h"
@@ -31,6 +33,7 @@ struct Recipe {
   VerifyParams verify;
   MfsParams mfs;  ///< Its seed follows `seed`.
   TcsParams tcs;
+  GyroidParams gyroid;
   JointParams joint;
   PrintParams print;
   Material material;
@@ -63,6 +66,8 @@ struct RecipeKey {
 /// What the numbers must be to each other, and that everything `infill` makes is at least two voxels thick. A voxel of
 /// 0 checks the first alone. Only features that `infill` uses matter. @throws Error BadRecipe, naming the key.
 void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill = InfillKind::Hybrid);
+/// What find_cores() needs to know: numbers of the partition, and a diameter that holds two fibres and a wall around.
+[[nodiscard]] CoreParams core_params(const Recipe& recipe);
 /// The thinnest feature that `infill` makes, mm; infinity if it makes none.
 [[nodiscard]] double thinnest_mm(const Recipe& recipe, InfillKind infill = InfillKind::Hybrid);
 

@@ -24,6 +24,7 @@ namespace fibrolite {
 // From a frame's coordinates back to the world's. Cost: O(parts), one more turn of each point asked for.
 [[nodiscard]] Axis placed(const Axis& axis, const Frame& frame);
 [[nodiscard]] Cut placed(Cut cut, const Frame& frame);
+[[nodiscard]] Core placed(Core core, const Frame& frame);
 [[nodiscard]] Partition placed(Partition partition, const Frame& frame);
 [[nodiscard]] Parts placed(const Parts& parts, const Frame& frame);
 

@@ -8,17 +8,19 @@
 namespace fibrolite {
 
 /// What a whole run fills the body with.
-enum class InfillKind { Hybrid, Tcs, Mfs, Solid };
+enum class InfillKind { Hybrid, Tcs, Mfs, Solid, Gyroid, Shell };
 
 struct InfillName {
   InfillKind kind;
   std::string_view name, help;
 };
-inline constexpr std::array<InfillName, 4> infill_names{{
+inline constexpr std::array<InfillName, 6> infill_names{{
     {InfillKind::Hybrid, "hybrid", "fibres in columns, crystal in bulk, joints between (the paper's method)"},
     {InfillKind::Tcs, "tcs", "tetrahedral crystal everywhere, no partition"},
     {InfillKind::Mfs, "mfs", "muscle fibres everywhere, no partition"},
     {InfillKind::Solid, "solid", "filled"},
+    {InfillKind::Gyroid, "gyroid", "gyroid walls everywhere, no partition: to compare with"},
+    {InfillKind::Shell, "shell", "nothing: the shell alone, to compare with"},
 }};
 
 }  // namespace fibrolite

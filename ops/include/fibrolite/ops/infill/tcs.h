@@ -2,11 +2,11 @@
 // Tetrahedral crystal structure (paper Sec. 5.2).
 #pragma once
 
-#include <algorithm>
 #include <functional>
 #include <optional>
 
 #include "fibrolite/ops/fill.h"
+#include "fibrolite/ops/infill/cell_edges.h"
 #include "fibrolite/ops/part.h"
 
 namespace fibrolite {
@@ -16,16 +16,6 @@ enum class TcsForm {
   Sticks,   ///< The paper's balls and sticks.
   Network,  ///< One side of a level set of the D nodal approximation: sticks without sharp joints.
   Sheet,    ///< The Schwarz D membrane between two such networks, equally thick everywhere.
-};
-
-/// Edges of the crystal's cell; one number is a cube.
-struct CellEdges {
-  double x, y, z;
-  constexpr CellEdges(double edge) : x(edge), y(edge), z(edge) {}  // NOLINT(google-explicit-constructor)
-  constexpr CellEdges(double along_x, double along_y, double along_z) : x(along_x), y(along_y), z(along_z) {}
-  [[nodiscard]] constexpr double least() const { return std::min(x, std::min(y, z)); }
-  [[nodiscard]] constexpr double most() const { return std::max(x, std::max(y, z)); }
-  friend constexpr bool operator==(const CellEdges&, const CellEdges&) = default;
 };
 
 /// The least edge of a cell over the thickness of its members; below it there is little void left.
