@@ -9,6 +9,7 @@
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
+#include "exit_codes.h"
 #include "job.h"
 #include "options.h"
 #include "summary.h"
@@ -78,6 +79,8 @@ void generate(const GenerateOptions& options) {
   params.recipe.verify.up = direction(options.model.up);
   check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
 
+  if (options.pictures.views.size() > options.pictures.files.size())
+    throw UsageError("more views than pictures", "--view", "give each a --picture");
   Job job("generate", params.recipe, options.model, options.run, options.targets());
   const Context& context = job.context();
   Outputs& outputs = job.outputs;

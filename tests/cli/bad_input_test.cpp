@@ -157,6 +157,14 @@ TEST_F(BadInput, OutputEndings) {
   refused_option({"--picture", outputs / "a.jpg"}, Usage);
   refused_option({"--steps", outputs / "a.stl"}, Usage);
 }
+TEST_F(BadInput, Views) {
+  for (const char* view : {"front", "part", "part:", "part:x", "part:0:back", "joint:-1", "joint:99999"})
+    EXPECT_THAT(refused_option({"--picture", outputs / "a.png", "--view", view}, Usage), HasSubstr("joint:NUMBER"));
+  EXPECT_THAT(refused_option({"--view", "whole"}, Usage), HasSubstr("more views than pictures"));
+  EXPECT_THAT(refused_option({"--infill", "tcs", "--voxel", "0.4", "--picture", outputs / "a.png", "--view", "joint:0"},
+                             BadRecipe),
+              HasSubstr("this model has none"));
+}
 TEST_F(BadInput, OneNameForTwoOutputs) {
   refused_option({"-o", outputs / "out.stl"}, Usage);
   refused_option({"--report", outputs / "." / "out.stl"}, Usage);
