@@ -4,12 +4,12 @@
 #include <memory>
 
 #include "commands.h"
+#include "exit_codes.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
-#include "exit_codes.h"
 #include "job.h"
 #include "options.h"
 #include "summary.h"
