@@ -13,6 +13,7 @@
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/prepare.h"
 #include "fibrolite/ops/text.h"
+#include "fibrolite/random.h"
 #include "fibrolite/winding.h"
 #include "mesh_checks.h"
 #include "run_program.h"
@@ -101,6 +102,16 @@ void check_printable(Table& table, const std::string& name, const json& report) 
   check_slicer(table, name);
 }
 
+/// Nothing hangs free or by a neck too thin, and every joint is one region that touches both its sides.
+void check_joined(Table& table, const std::string& name, const json& report) {
+  table.equal(name + ": ends in the void", report["solid"]["dangling"], 0);
+  table.equal(name + ": material on too thin a neck", report["solid"]["unreached"], 0);
+  std::size_t sound = 0;
+  for (const json& interface : report["interfaces"])
+    sound += interface["regions_after"] == 1 && number(interface["contact_area_mm2"]) > 0 ? 1 : 0;
+  table.equal(name + ": joints in one region, with contact", sound, report["interfaces"].size());
+}
+
 /// How far the written mesh reaches outside the model, in voxels.
 void check_inside(Table& table, const std::string& name, const fs::path& model, double size_mm, double voxel_mm) {
   const WindingTree tree(prepare(read_mesh(model), {.size_mm = size_mm, .unit_mm = {}}).mesh);
@@ -123,6 +134,7 @@ void models(Table& table) {
       const json report = table.generate(name, table.models / file, {"--size", "100", "--infill", infill});
       if (report.is_null()) continue;
       check_printable(table, name, report);
+      check_joined(table, name, report);
       if (infill != std::string("solid"))
         table.row(name + ": fill ratio", number(report["solid"]["fill_ratio"]), 0.1, 0.8);
       if (clean.contains(file))
@@ -287,12 +299,47 @@ void turned_models(Table& table) {
   }
 }
 
+/// Each model turned at random in its file, its load turned with it.
+void rotations(Table& table) {
+  std::uint64_t id = 0;
+  for (const char* file : {"horse.ply", "armadillo.obj", "hand.obj", "spot.obj", "rocker-arm.obj", "fertility.off",
+                           "monkey.obj", "bunny-open.obj"}) {
+    const Mesh mesh = prepare(read_mesh(table.models / file), {.size_mm = 100, .unit_mm = {}}).mesh;
+    for (int turn = 0; turn < 3; ++turn) {
+      Random random(1, "rotations", id++);
+      const auto unit = [&] { return 2 * random.uniform() - 1; };
+      Frame frame = frame_along({}, {unit(), unit(), unit() + 0.01});
+      const double angle = std::numbers::pi * unit();
+      const Vec3d x = std::cos(angle) * frame.x + std::sin(angle) * frame.y;
+      frame = {{}, x, cross(frame.z, x), frame.z};
+      Mesh turned_mesh = mesh;
+      for (Vec3f& v : turned_mesh.vertices) v = to_float(frame.to_world(to_double(v)));
+      const fs::path turned_file = table.work / "rotated.ply";
+      write_mesh(turned_file, turned_mesh);
+      const auto listed = [](Vec3d v) { return json::array({v.x, v.y, v.z}); };
+      const auto load_case = [&](const char* name, Vec3d force) {
+        return json{{"name", name},
+                    {"supports", {{{"where", {{"lowest", {{"share", 0.05}, {"along", listed(frame.z)}}}}}}}},
+                    {"forces",
+                     {{{"force_n", 1000}, {"direction", listed(force)}, {"where", {{"seen_from", listed(frame.z)}}}}}}};
+      };
+      const json loads = {load_case("from above", -frame.z), load_case("at 45 degrees", -frame.z - frame.x)};
+      const std::string name = fs::path(file).stem().string() + "-turned-" + std::to_string(turn);
+      const json report = table.generate(name, turned_file, {"--set", std::string("loads=").append(loads.dump())});
+      if (report.is_null()) continue;
+      check_printable(table, name, report);
+      check_joined(table, name, report);
+    }
+  }
+}
+
 void shapes(Table& table) {
   for (const char* name : {"torus", "y", "bent_tube", "figure", "bracket", "molar"}) {
     const json report =
         table.generate(name, asset(name), {"--size", "100", "--picture", table.work / (std::string(name) + ".png")});
     if (report.is_null()) continue;
     check_printable(table, name, report);
+    check_joined(table, name, report);
     std::string parts;
     for (const json& part : report["parts"])
       parts += part["kind"].get<std::string>() + " " + number_text(number(part["volume_mm3"]), 3) + "; ";
@@ -357,8 +404,8 @@ void shifts(Table& table) {
 }
 
 const std::vector<std::pair<std::string, std::function<void(Table&)>>> sections{
-    {"horse", horse},          {"models", models}, {"molar", molar},     {"voxels", voxels}, {"load", load},
-    {"turned", turned_models}, {"shapes", shapes}, {"threads", threads}, {"shifts", shifts}};
+    {"horse", horse},          {"models", models},       {"molar", molar},   {"voxels", voxels},   {"load", load},
+    {"turned", turned_models}, {"rotations", rotations}, {"shapes", shapes}, {"threads", threads}, {"shifts", shifts}};
 
 }  // namespace
 
