@@ -283,6 +283,7 @@ const std::vector<Field>& table() {
             "gaps inside narrower than this are reported, and closed with --fix"),
       field("print.overhang_deg", &R::print, &PrintParams::overhang_deg, {0, 90},
             "faces inside that lean more than this from upright are reported; 90 is a ceiling"),
+      field("print.check", &R::print, &PrintParams::check, "look for thin walls, small gaps and overhangs"),
       field("print.drain_mm", &R::print, &PrintParams::drain_mm, {0, 1000},
             "diameter of a hole in every closed void, 2 voxels or more; 0: none; auto: none, with --fix 2 mm"),
 

@@ -140,8 +140,8 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
   double node_mm = 2 * limits.wall_mm;
   for (const Fill& fill : fills) node_mm = std::max(node_mm, fill.ball_mm);
   const Shape lumen = offset(distance_to(body), -0.5 * shell_mm);
-  report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm, context);
-  report.print.checked = true;
+  if (limits.check) report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm, context);
+  report.print.checked = limits.check;
   report.print.drains = out.drains;
   report.print.thickened = static_cast<std::int64_t>(out.thickened.size());
   report.print.voids_filled = out.voids_filled;

@@ -65,6 +65,18 @@ TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density)
   }
 }
 
+TEST(Hybridize, print_checks_can_be_left_out) {
+  HybridizeParams params;
+  params.infill = InfillKind::Tcs;
+  params.voxel_mm = 0.4;
+  const Mesh mesh = model("molar");
+  EXPECT_TRUE(run(mesh, params).report.print.checked);
+  params.recipe.print.check = false;
+  const Report without = run(mesh, params).report;
+  EXPECT_FALSE(without.print.checked);
+  EXPECT_EQ(to_json(without).find("thin_walls"), std::string::npos);
+}
+
 TEST(Hybridize, quadruped_has_fibres_in_its_legs_and_crystal_in_its_body_at_every_voxel) {
   const Mesh mesh = model("quadruped");
   const Outcome coarse = run(mesh, {.recipe = sturdy(), .voxel_mm = 0.5}),
