@@ -4,11 +4,11 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <string>
 
 #include "cholesky.h"
 #include "fibrolite/box.h"
+#include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
 #include "stiffness.h"
 #include "tet_element.h"
@@ -21,15 +21,9 @@ namespace {
 /// it.
 void require_held(const System& system, const std::vector<Fixed>& fixed) {
   const TetMesh& mesh = system.mesh;
-  std::vector<std::uint32_t> root(mesh.nodes.size());
-  std::iota(root.begin(), root.end(), 0U);
-  const auto find = [&](std::uint32_t n) {
-    while (root[n] != n) n = root[n] = root[root[n]];
-    return n;
-  };
-  for (const auto& tet : mesh.tets) {
-    for (const std::uint32_t node : tet) root[std::max(find(tet[0]), find(node))] = std::min(find(tet[0]), find(node));
-  }
+  DisjointSets sets(mesh.nodes.size());
+  for (const auto& tet : mesh.tets)
+    for (const std::uint32_t node : tet) sets.join(tet[0], node);
   struct Piece {
     Box3d box;
     Eigen::Matrix<double, 6, 6> held = Eigen::Matrix<double, 6, 6>::Zero();
@@ -38,7 +32,7 @@ void require_held(const System& system, const std::vector<Fixed>& fixed) {
   std::vector<std::uint32_t> piece(mesh.nodes.size(), none);
   for (std::uint32_t node = 0; node < mesh.nodes.size(); ++node) {
     if (!system.incidence.used(node)) continue;
-    const std::uint32_t r = find(node);
+    const std::uint32_t r = sets.root(node);
     if (piece[r] == none) {
       piece[r] = static_cast<std::uint32_t>(pieces.size());
       pieces.emplace_back();

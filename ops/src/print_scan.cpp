@@ -9,10 +9,10 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <numeric>
 #include <tuple>
 
 #include "fibrolite/blocks.h"
+#include "fibrolite/disjoint_sets.h"
 #include "fibrolite/frame.h"
 
 namespace fibrolite {
@@ -170,12 +170,7 @@ std::vector<std::size_t> patch_numbers(const std::vector<Spot>& spots) {
   std::vector<Key> sorted = keys;
   std::sort(sorted.begin(), sorted.end());
   sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-  std::vector<std::size_t> parent(sorted.size());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const auto root = [&](std::size_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(sorted.size());
   for (int n = 14; n < 27; ++n) {  // the 13 neighbours that come later
     const Key step = key(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1) - key(0, 0, 0);
     std::size_t j = 0;
@@ -183,14 +178,13 @@ std::vector<std::size_t> patch_numbers(const std::vector<Spot>& spots) {
       while (j < sorted.size() && sorted[j] < sorted[i] + step) ++j;
       if (j == sorted.size()) break;
       if (sorted[j] != sorted[i] + step) continue;
-      const std::size_t a = root(i), b = root(j);
-      parent[std::max(a, b)] = std::min(a, b);
+      sets.join(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j));
     }
   }
   std::vector<std::size_t> number;
   for (const Key k : keys)
     number.push_back(
-        root(static_cast<std::size_t>(std::lower_bound(sorted.begin(), sorted.end(), k) - sorted.begin())));
+        sets.root(static_cast<std::uint32_t>(std::lower_bound(sorted.begin(), sorted.end(), k) - sorted.begin())));
   return number;
 }
 

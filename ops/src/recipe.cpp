@@ -60,7 +60,10 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   const bool hybrid = infill == InfillKind::Hybrid;
   if (hybrid || infill == InfillKind::Tcs) list.push_back({member_key(recipe.tcs), members(recipe.tcs).least_mm});
   if (hybrid || infill == InfillKind::Mfs) list.push_back({"mfs.wall_mm", recipe.mfs.wall_mm});
-  if (infill == InfillKind::Gyroid)
+  const auto& chosen = recipe.partition.overrides.parts;
+  const bool gyroid_part =
+      hybrid && std::any_of(chosen.begin(), chosen.end(), [](const auto& c) { return c.infill == PartInfill::Gyroid; });
+  if (infill == InfillKind::Gyroid || gyroid_part)
     list.push_back({recipe.gyroid.density ? "gyroid.density" : "gyroid.wall_mm", sized(recipe.gyroid).wall_mm});
   if (hybrid && recipe.joint.enabled) {
     list.push_back({"joint.layer_mm", recipe.joint.layer_mm});
@@ -160,6 +163,8 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   if (infill == InfillKind::Tcs && recipe.tcs.grade == TcsGrade::Stress)
     unfit("tcs.grade is stress, which only a hybrid run knows", "recipe", "use --infill hybrid, or tcs.grade=surface");
   if (hybrid || infill == InfillKind::Mfs) check_mfs(recipe.mfs);
+  if (hybrid && recipe.partition.by == PartBy::Load && !recipe.partition.overrides.cuts.empty())
+    unfit("partition.overrides.cuts part by shape, but partition.by is load", "recipe", "use partition.by=both");
   if (infill == InfillKind::Gyroid) (void)density(recipe.gyroid);
   if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);
 

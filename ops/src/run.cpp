@@ -134,14 +134,14 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
   const TieParams ties{.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
   const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
   Mended out{tied, {}, {}, 0};
-  if (fix || drain_mm > 0) {
-    out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
-  }
+  const bool mending = fix || drain_mm > 0;
+  if (!mending && !limits.check) return out;
+  if (mending) out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
   double node_mm = 2 * limits.wall_mm;
   for (const Fill& fill : fills) node_mm = std::max(node_mm, fill.ball_mm);
   const Shape lumen = offset(distance_to(body), -0.5 * shell_mm);
-  if (limits.check) report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm, context);
-  report.print.checked = limits.check;
+  report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm, context);
+  report.print.checked = true;
   report.print.drains = out.drains;
   report.print.thickened = static_cast<std::int64_t>(out.thickened.size());
   report.print.voids_filled = out.voids_filled;

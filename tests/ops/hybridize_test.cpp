@@ -10,31 +10,17 @@
 #include <string>
 
 #include "fibrolite/vdb.h"
+#include "hybrid_runs.h"
 #include "models.h"
 
 namespace fibrolite {
 namespace {
 
 using testing::asset;
+using testing::hybridized;
+using testing::Outcome;
+using testing::sturdy;
 
-/// The default recipe with members thick enough for a voxel of 0.5 mm.
-Recipe sturdy() {
-  Recipe recipe;
-  recipe.tcs.stick_mm = recipe.mfs.wall_mm = recipe.joint.column_mm = recipe.joint.min_wall_mm = 1.0;
-  recipe.mfs.fibre_mm = 3;
-  return recipe;
-}
-
-struct Outcome {
-  Hybrid hybrid;
-  Report report;
-};
-Outcome run(const Mesh& mesh, const HybridizeParams& params) {
-  const Model model = prepare({mesh, 1.0, {}}, {});
-  Outcome out;
-  out.hybrid = hybridize(model, params, out.report);
-  return out;
-}
 Mesh model(const std::string& name) { return read_mesh(asset(name)).mesh; }
 
 std::vector<std::string> kinds(const Report& report) {
@@ -51,7 +37,7 @@ TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density)
     params.infill = InfillKind::Tcs;
     params.voxel_mm = 0.3;
     params.recipe.tcs = {.form = form, .cell_mm = 12, .density = 0.2};
-    const Report even = run(mesh, params).report;
+    const Report even = hybridized(mesh, params).report;
     EXPECT_EQ(even.solid.pieces, 1);
     const PartReport part = even.parts.at(0);
     EXPECT_NEAR(part.infill_volume_mm3 / part.lumen_mm3, 0.2, 0.03);
@@ -59,7 +45,7 @@ TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density)
     params.recipe.tcs.grade = TcsGrade::Surface;
     params.recipe.tcs.grade_most = 1.4;
     params.recipe.tcs.grade_depth_mm = 12;
-    const Report thicker = run(mesh, params).report;
+    const Report thicker = hybridized(mesh, params).report;
     EXPECT_EQ(thicker.solid.pieces, 1);
     EXPECT_GT(thicker.parts.at(0).infill_volume_mm3, 1.15 * part.infill_volume_mm3);
   }
@@ -70,17 +56,20 @@ TEST(Hybridize, print_checks_can_be_left_out) {
   params.infill = InfillKind::Tcs;
   params.voxel_mm = 0.4;
   const Mesh mesh = model("molar");
-  EXPECT_TRUE(run(mesh, params).report.print.checked);
+  EXPECT_TRUE(hybridized(mesh, params).report.print.checked);
   params.recipe.print.check = false;
-  const Report without = run(mesh, params).report;
+  const Report without = hybridized(mesh, params).report;
   EXPECT_FALSE(without.print.checked);
   EXPECT_EQ(to_json(without).find("thin_walls"), std::string::npos);
+  // What is mended is told whatever the recipe says.
+  params.recipe.print.drain_mm = 2;
+  EXPECT_TRUE(hybridized(mesh, params).report.print.checked);
 }
 
 TEST(Hybridize, quadruped_has_fibres_in_its_legs_and_crystal_in_its_body_at_every_voxel) {
   const Mesh mesh = model("quadruped");
-  const Outcome coarse = run(mesh, {.recipe = sturdy(), .voxel_mm = 0.5}),
-                fine = run(mesh, {.recipe = sturdy(), .voxel_mm = 0.25});
+  const Outcome coarse = hybridized(mesh, {.recipe = sturdy(), .voxel_mm = 0.5}),
+                fine = hybridized(mesh, {.recipe = sturdy(), .voxel_mm = 0.25});
 
   EXPECT_EQ(coarse.report.solid.pieces, 1);
   EXPECT_GT(coarse.report.solid.fill_ratio, 0.1);
@@ -121,19 +110,19 @@ TEST(Hybridize, quadruped_has_fibres_in_its_legs_and_crystal_in_its_body_at_ever
 TEST(Hybridize, a_turned_model_gives_the_same_parts) {
   const Mesh mesh = model("cylinder_on_box");
   const HybridizeParams upright{.recipe = sturdy(), .voxel_mm = 0.5};
-  const Outcome straight = run(mesh, upright);
+  const Outcome straight = hybridized(mesh, upright);
   for (const int axis : {0, 1, 2}) {
     HybridizeParams turned = upright;
     turned.recipe.verify.up = axis == 0 ? Vec3d{0, -1, 0} : axis == 1 ? Vec3d{1, 0, 0} : Vec3d{0, 0, 1};
     turned.recipe.verify.azimuth_deg = 0;
-    const Outcome out = run(testing::turned(mesh, axis, 1), turned);
+    const Outcome out = hybridized(testing::turned(mesh, axis, 1), turned);
     EXPECT_EQ(kinds(out.report), kinds(straight.report));
     EXPECT_NEAR(out.report.solid.volume_mm3 / straight.report.solid.volume_mm3, 1, 0.01);
   }
 }
 
 TEST(Hybridize, the_steps_united_by_openvdb_are_the_fused_solid) {
-  const Outcome out = run(model("cylinder_on_box"), {.recipe = sturdy(), .voxel_mm = 0.5, .steps = true});
+  const Outcome out = hybridized(model("cylinder_on_box"), {.recipe = sturdy(), .voxel_mm = 0.5, .steps = true});
   std::map<std::string, Solid> step;
   for (const NamedSolid& s : out.hybrid.steps) step.emplace(s.name, s.solid);
   ASSERT_TRUE(step.contains("body") && step.contains("shell") && step.contains("fill_0") && step.contains("solid"));
@@ -164,7 +153,7 @@ TEST(Hybridize, the_steps_united_by_openvdb_are_the_fused_solid) {
 TEST(Hybridize, the_molar_weighs_what_the_paper_says) {
   const Mesh mesh = model("molar");
   const auto mass = [&](InfillKind kind) {
-    return run(mesh, {.recipe = {}, .infill = kind, .voxel_mm = 0.4}).report.solid.mass_g;
+    return hybridized(mesh, {.recipe = {}, .infill = kind, .voxel_mm = 0.4}).report.solid.mass_g;
   };
   const double tcs = mass(InfillKind::Tcs), hybrid = mass(InfillKind::Hybrid), mfs = mass(InfillKind::Mfs),
                full = mass(InfillKind::Solid);
@@ -177,7 +166,7 @@ TEST(Hybridize, the_molar_weighs_what_the_paper_says) {
 
 TEST(Hybridize, a_filled_body_is_the_model) {
   const Mesh mesh = model("bracket");
-  const Outcome out = run(mesh, {.recipe = {}, .infill = InfillKind::Solid, .voxel_mm = 0.4});
+  const Outcome out = hybridized(mesh, {.recipe = {}, .infill = InfillKind::Solid, .voxel_mm = 0.4});
   EXPECT_NEAR(out.report.solid.volume_mm3 / signed_volume(mesh), 1, 0.005);
   EXPECT_NEAR(out.report.solid.fill_ratio, 1, 1e-3);
 }

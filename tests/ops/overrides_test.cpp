@@ -6,38 +6,22 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fibrolite/ops/hybridize.h"
 #include "fibrolite/random.h"
+#include "hybrid_runs.h"
 #include "models.h"
 #include "refusal.h"
 
 namespace fibrolite {
 namespace {
 
+using testing::hybridized;
 using testing::refusal;
+using testing::sturdy;
 
 Mesh block(Vec3d size) {
   Mesh mesh = testing::cube(1);
   for (Vec3f& v : mesh.vertices) v = to_float({v.x * size.x, v.y * size.y, v.z * size.z});
   return mesh;
-}
-
-/// Members thick enough for a voxel of 0.5 mm.
-Recipe sturdy() {
-  Recipe recipe;
-  recipe.tcs.stick_mm = recipe.mfs.wall_mm = recipe.joint.column_mm = recipe.joint.min_wall_mm = 1.0;
-  recipe.mfs.fibre_mm = 3;
-  return recipe;
-}
-
-struct Outcome {
-  Hybrid hybrid;
-  Report report;
-};
-Outcome run(const Mesh& mesh, const Recipe& recipe) {
-  Outcome out;
-  out.hybrid = hybridize(prepare({mesh, 1.0, {}}, {}), {.recipe = recipe, .voxel_mm = 0.5}, out.report);
-  return out;
 }
 
 TEST(Overrides, RecipeRoundTrip) {
@@ -87,10 +71,27 @@ TEST(Overrides, KeptSolidIsTheUnionOfItsRegions) {
   EXPECT_NEAR(kept({5, 1, 1}), 2, 0.3);  // the cylinder's mantle, the box is 3 away
 }
 
+TEST(Overrides, CutsAndCoresAloneContradictEachOther) {
+  Recipe recipe;
+  recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};
+  recipe.partition.by = PartBy::Load;
+  EXPECT_NE(refusal([&] { check_recipe(recipe, 0.2); }).find("partition.by=both"), std::string::npos);
+  recipe.partition.by = PartBy::Both;
+  EXPECT_EQ(refusal([&] { check_recipe(recipe, 0.2); }), "");
+}
+
+TEST(Overrides, AChosenGyroidMustBeTwoVoxelsThick) {
+  Recipe recipe;
+  recipe.gyroid.wall_mm = 0.3;
+  EXPECT_EQ(refusal([&] { check_recipe(recipe, 0.2); }), "");
+  recipe.partition.overrides.parts = {{0, PartInfill::Gyroid}};
+  EXPECT_NE(refusal([&] { check_recipe(recipe, 0.2); }).find("gyroid.wall_mm"), std::string::npos);
+}
+
 TEST(Overrides, ACutPartsABarWhereItIsGiven) {
   Recipe recipe = sturdy();
   recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};
-  const Outcome out = run(block({60, 20, 20}), recipe);
+  const testing::Outcome out = hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
   ASSERT_EQ(out.report.parts.size(), 2U);
   EXPECT_NEAR(out.report.parts[0].volume_mm3, 40 * 400, 0.01 * 40 * 400);
   EXPECT_NEAR(out.report.parts[1].volume_mm3, 20 * 400, 0.01 * 20 * 400);
@@ -99,14 +100,17 @@ TEST(Overrides, ACutPartsABarWhereItIsGiven) {
   EXPECT_EQ(out.report.solid.pieces, 1);
 
   recipe.partition.overrides.cuts[0].point_mm = {200, 0, 0};
-  EXPECT_NE(refusal([&] { (void)run(block({60, 20, 20}), recipe); }).find("overrides.cuts[0]"), std::string::npos);
+  EXPECT_NE(refusal([&] {
+              (void)hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
+            }).find("overrides.cuts[0]"),
+            std::string::npos);
 }
 
 TEST(Overrides, APartGetsTheInfillItIsGiven) {
   Recipe recipe = sturdy();
   recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};
   recipe.partition.overrides.parts = {{1, PartInfill::Solid}};
-  const Outcome out = run(block({60, 20, 20}), recipe);
+  const testing::Outcome out = hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
   const auto& parts = out.report.parts;
   ASSERT_EQ(parts.size(), 2U);
   EXPECT_EQ(parts[1].infill, "solid");
@@ -116,16 +120,17 @@ TEST(Overrides, APartGetsTheInfillItIsGiven) {
   EXPECT_NE(parts[1].reason.find("as the recipe says"), std::string::npos);
 
   recipe.partition.overrides.parts = {{7, PartInfill::Solid}};
-  EXPECT_NE(refusal([&] { (void)run(block({60, 20, 20}), recipe); }).find("use 0 to 1"), std::string::npos);
+  EXPECT_NE(refusal([&] {
+              (void)hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
+            }).find("use 0 to 1"),
+            std::string::npos);
 }
 
 TEST(Overrides, ARegionRoundAHoleStaysSolid) {
   Recipe recipe = sturdy();
   recipe.partition.overrides.solid = {Cylinder{{10, 10, -1}, {10, 10, 21}, 8}};
   const Mesh mesh = block({20, 20, 20});
-  HybridizeParams params{.recipe = recipe, .infill = InfillKind::Tcs, .voxel_mm = 0.5};
-  Report report;
-  const Hybrid made = hybridize(prepare({mesh, 1.0, {}}, {}), params, report);
+  const Hybrid made = hybridized(mesh, {.recipe = recipe, .infill = InfillKind::Tcs, .voxel_mm = 0.5}).hybrid;
   Random random(3, "kept", 0);
   for (int i = 0; i < 300; ++i) {
     const double angle = 6.28 * random.uniform(), r = 3.6 * std::sqrt(random.uniform());
@@ -151,7 +156,7 @@ TEST(Overrides, RandomPartsOfABoxAreAlwaysOnePiece) {
     }
     for (int id = 0; id <= cuts; ++id)
       recipe.partition.overrides.parts.push_back({id, static_cast<PartInfill>(random.below(3))});
-    const Report report = run(block(size), recipe).report;
+    const Report report = hybridized(block(size), {.recipe = recipe, .voxel_mm = 0.5}).report;
     const int parts = static_cast<int>(report.parts.size());
     EXPECT_GT(parts, cuts);
     EXPECT_EQ(report.solid.pieces, 1) << "seed " << seed;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "bounds.h"
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
 
@@ -96,16 +97,7 @@ TEST(Gyroid, is_no_steeper_than_it_says_and_a_distance_near_its_walls) {
     const bool near = std::abs(here) < 0.5 && std::abs(there) < 0.5;
     ASSERT_LE(std::abs(here - there), (near ? 1.05 : shape.lipschitz()) * norm(d));
   }
-  for (int i = 0; i < 200; ++i) {
-    const Vec3d low{20 * random.uniform(), 20 * random.uniform(), 20 * random.uniform()};
-    const double size = 0.2 + 3 * random.uniform();
-    const Interval bound = shape.bound({low, low + Vec3d{size, size, size}});
-    for (int k = 0; k < 50; ++k) {
-      const float v = shape(low + size * Vec3d{random.uniform(), random.uniform(), random.uniform()});
-      ASSERT_GE(v, bound.lo);
-      ASSERT_LE(v, bound.hi);
-    }
-  }
+  testing::expect_bounds_hold(shape, random, 200);
 }
 
 TEST(Gyroid, a_wanted_density_is_met) {

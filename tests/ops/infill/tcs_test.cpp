@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "bounds.h"
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
@@ -219,17 +220,7 @@ TEST_P(Smooth, values_are_distances) {
 
 TEST_P(Smooth, bounds_hold_in_every_box) {
   const Shape shape = crystal(GetParam());
-  Random random(6, "tcs_test");
-  for (int i = 0; i < 300; ++i) {
-    const Vec3d low{20 * random.uniform(), 20 * random.uniform(), 20 * random.uniform()};
-    const double size = 0.2 + 3 * random.uniform();
-    const Interval bound = shape.bound({low, low + Vec3d{size, size, size}});
-    for (int k = 0; k < 50; ++k) {
-      const float v = shape(low + size * Vec3d{random.uniform(), random.uniform(), random.uniform()});
-      ASSERT_GE(v, bound.lo);
-      ASSERT_LE(v, bound.hi);
-    }
-  }
+  testing::expect_bounds_hold(shape, Random(6, "tcs_test"), 300);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -18,7 +18,7 @@ struct PrintParams {
   double gap_mm = 0.4;               ///< Narrowest gap inside; above 0.
   double overhang_deg = 45;          ///< Steepest face that needs no support: 0 is upright, 90 a ceiling; 0 to 90.
   std::optional<double> drain_mm{};  ///< Diameter of drain holes; none: only mending drains, with default_drain_mm.
-  bool check = true;                 ///< Look for such places at all; a tenth to a fifth of a run at fine voxels.
+  bool check = true;  ///< Look for such places also if nothing is mended; a tenth to a fifth of a run at fine voxels.
 };
 inline constexpr double default_drain_mm = 2;
 
