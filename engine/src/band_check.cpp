@@ -51,7 +51,7 @@ bool across(const float* v, bool upper, const float* other, float tile, int stri
 
 /// Blocks of inner tiles that touch outer ones, and those outer ones. Almost all tiles lie among others of their node,
 /// whose table is quicker to read than the tree.
-void inner_tiles_at_the_outside(const Tree& tree, std::vector<Coord>& blocks) {
+void inner_tiles_at_the_outside(const Tree& tree, const openvdb::CoordBBox& known, std::vector<Coord>& blocks) {
   using Node = Tree::RootNodeType::ChildNodeType::ChildNodeType;
   std::vector<const Node*> nodes;
   tree.getNodes(nodes);
@@ -75,7 +75,7 @@ void inner_tiles_at_the_outside(const Tree& tree, std::vector<Coord>& blocks) {
             Coord place = node.offsetToGlobalCoord(n);
             const Coord inner = place;
             place[axis] += 8 * step;
-            if (!same_node && !outer(place)) continue;
+            if (!known.isInside(place) || (!same_node && !outer(place))) continue;
             found[i].push_back(inner);
             found[i].push_back(place);
           }
@@ -98,7 +98,8 @@ void inner_tiles_at_the_outside(const Tree& tree, std::vector<Coord>& blocks) {
         place[axis] = step < 0 ? box.min()[axis] - 8 : box.max()[axis] + 1;
         for (place[u] = box.min()[u]; place[u] <= box.max()[u]; place[u] += 8) {
           for (place[w] = box.min()[w]; place[w] <= box.max()[w]; place[w] += 8) {
-            if (access.probeConstLeaf(place) != nullptr || access.getValue(place) < 0) continue;
+            if (!known.isInside(place) || access.probeConstLeaf(place) != nullptr || access.getValue(place) < 0)
+              continue;
             Coord inner = place;
             inner[axis] -= 8 * step;
             blocks.push_back(inner);
@@ -112,7 +113,7 @@ void inner_tiles_at_the_outside(const Tree& tree, std::vector<Coord>& blocks) {
 
 }  // namespace
 
-std::vector<Coord> contradictions(const Tree& tree, double voxel_mm) {
+std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openvdb::CoordBBox& box) {
   const openvdb::tree::LeafManager<const Tree> leaves(tree);
   const auto limit = static_cast<float>(voxel_mm * 1.01);
   // One bit per direction of the face (-x +x -y +y -z +z) and one for the inside.
@@ -130,6 +131,7 @@ std::vector<Coord> contradictions(const Tree& tree, double voxel_mm) {
       unsigned bits = !uniform(v) && within(v, limit) ? 64U : 0U;
       for (int face = 0; face < 6; ++face) {
         const Coord place = neighbour(leaf.origin(), face);
+        if (!box.isInside(place)) continue;
         const Leaf* next = access.probeConstLeaf(place);
         const bool upper = face % 2 == 1;
         if (next != nullptr && !upper) continue;  // seen from there
@@ -148,7 +150,7 @@ std::vector<Coord> contradictions(const Tree& tree, double voxel_mm) {
       if ((found[i] >> face & 1) != 0) blocks.push_back(neighbour(leaves.leaf(i).origin(), face));
     }
   }
-  inner_tiles_at_the_outside(tree, blocks);
+  inner_tiles_at_the_outside(tree, box, blocks);
   std::sort(blocks.begin(), blocks.end());
   blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
   return blocks;

@@ -10,7 +10,9 @@ namespace fibrolite {
 
 /// Samples at neighbouring places on different sides whose distances add up to more than their spacing: no surface can
 /// lie between them, so their sides contradict each other (the surface overlaps itself). Returns the samples' blocks of
-/// 8, each once, sorted. Cost: O(leaves), parallel.
-[[nodiscard]] std::vector<openvdb::Coord> contradictions(const openvdb::FloatTree& tree, double voxel_mm);
+/// 8, each once, sorted. Only blocks in `box` (whole blocks of 8) are held against each other. Cost: O(leaves),
+/// parallel.
+[[nodiscard]] std::vector<openvdb::Coord> contradictions(const openvdb::FloatTree& tree, double voxel_mm,
+                                                         const openvdb::CoordBBox& box = openvdb::CoordBBox::inf());
 
 }  // namespace fibrolite

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "fibrolite/error.h"
@@ -52,86 +53,135 @@ bool has_inside(const openvdb::FloatTree& tree) {
   return false;
 }
 
+[[noreturn]] void no_volume() {
+  throw Error(Code::BadInput, "the mesh encloses no volume at this voxel", {},
+              "close it, give it thickness, or use a smaller --voxel");
+}
+
+BandParams band_params(const ToSolidParams& params) {
+  BandParams band;
+  band.voxel_mm = params.grid.voxel_mm;
+  band.outside_vox = params.grid.band_vox;
+  band.inside_vox = static_cast<float>(params.inside_band_mm / params.grid.voxel_mm) + params.grid.band_vox;
+  return band;
+}
+
+/// A mesh and what is asked of it.
+struct Surface {
+  explicit Surface(std::shared_ptr<const Mesh> m)
+      : mesh(std::move(m)), topology(surface_topology(*mesh)), winding(*mesh) {}
+  std::shared_ptr<const Mesh> mesh;
+  SurfaceTopology topology;
+  WindingTree winding;
+};
+
+/// Where the winding number passes 1/2: a closed surface without overlaps.
+std::unique_ptr<Surface> outermost(const Surface& from, const BandParams& wanted, const Context& context) {
+  BandParams params = wanted;
+  params.inside_vox = params.outside_vox = 2;
+  params.by_winding = true;
+  Band band = TriangleBand(*from.mesh, from.topology, from.winding, params).whole(context.part(0, 0.8, ""));
+  if (!has_inside(*band.tree)) no_volume();
+  if (2 * band.doubtful_samples > band.inside_samples) {
+    throw Error(Code::BadInput, "the mesh is an open sheet, not the surface of a body", {},
+                "close it, or give the sheet a thickness");
+  }
+  return std::make_unique<Surface>(
+      std::make_shared<const Mesh>(sharp_zero_level(band.tree, params.voxel_mm, *from.mesh, from.winding, context)));
+}
+
+/// A mesh whose distances are the body's, found by looking at all of them once.
 class Conversion {
  public:
-  Conversion(const ToSolidParams& params, const Context& context) : params_(params), context_(context) {
-    const double voxel = params.grid.voxel_mm;
-    band_.voxel_mm = voxel;
-    band_.outside_vox = params.grid.band_vox;
-    band_.inside_vox = static_cast<float>(params.inside_band_mm / voxel) + params.grid.band_vox;
+  Conversion(std::shared_ptr<const Mesh> mesh, const ToSolidParams& params, const Context& context)
+      : params_(band_params(params)), surface_(std::make_unique<Surface>(std::move(mesh))) {
+    if (!surface_->topology.closed()) {
+      repairs_.emplace_back("open or irregular surface (" + std::to_string(surface_->topology.border.size()) +
+                            " border edges): inside and outside were told by winding number");
+      replace(context);
+    } else if (signed_volume(*surface_->mesh) < 0) {
+      repairs_.emplace_back("turned the surface outward: it was inside out");
+      surface_ = std::make_unique<Surface>(std::make_shared<const Mesh>(turned_inside_out(*surface_->mesh)));
+    }
+    band_ = std::make_unique<TriangleBand>(*surface_->mesh, surface_->topology, surface_->winding, params_);
   }
 
-  ToSolidResult run(const Mesh& mesh) {
-    const SurfaceTopology topology = surface_topology(mesh);
-    if (topology.closed()) {
-      if (signed_volume(mesh) < 0) {
-        repairs_.emplace_back("turned the surface outward: it was inside out");
-        return run(turned_inside_out(mesh));
-      }
-      if (auto tree = by_normals(mesh, topology, context_.part(0, 0.5, ""))) return result(std::move(tree));
+  /// Looks at the whole band one way or the other, again if the mesh must be replaced.
+  Band look(Band (TriangleBand::*way)(const Context&), const Context& context) {
+    Band band = ((*band_).*way)(context.part(0, 0.5, ""));
+    if (band.overlap && !replaced_) {
+      band = {};
       repairs_.emplace_back("overlapping surfaces: the outermost one was found by winding number");
-    } else {
-      repairs_.emplace_back("open or irregular surface (" + std::to_string(topology.border.size()) +
-                            " border edges): inside and outside were told by winding number");
+      band_.reset();
+      replace(context.part(0.5, 0.75, ""));
+      band_ = std::make_unique<TriangleBand>(*surface_->mesh, surface_->topology, surface_->winding, params_);
+      band = ((*band_).*way)(context.part(0.75, 1, ""));
+    } else if (band.cells_by_winding > 0 && !replaced_) {
+      repairs_.emplace_back("self-intersections: sides decided by winding number around them");
     }
-    return result(by_winding(mesh, topology));
+    context.progress(1);
+    return band;
   }
+
+  [[nodiscard]] const TriangleBand& band() const { return *band_; }
+  [[nodiscard]] const std::vector<std::string>& repairs() const { return repairs_; }
 
  private:
-  /// The distances of a closed mesh; nothing if it overlaps itself.
-  openvdb::FloatTree::Ptr by_normals(const Mesh& mesh, const SurfaceTopology& topology, const Context& context) {
-    const WindingTree winding(mesh);
-    context.check();
-    Band band = triangle_band(mesh, topology, winding, band_, context);
-    if (band.overlap) return nullptr;
-    if (band.cells_by_winding > 0)
-      repairs_.emplace_back("self-intersections: sides decided by winding number around them");
-    return band.tree;
+  void replace(const Context& context) {
+    surface_ = outermost(*surface_, params_, context);
+    replaced_ = true;
   }
 
-  /// Find the surface where the winding number passes 1/2, then the distances to that surface.
-  openvdb::FloatTree::Ptr by_winding(const Mesh& mesh, const SurfaceTopology& topology) {
-    BandParams params = band_;
-    params.inside_vox = params.outside_vox = 2;
-    params.by_winding = true;
-    const WindingTree winding(mesh);
-    Band band = triangle_band(mesh, topology, winding, params, context_.part(0, 0.4, ""));
-    if (!has_inside(*band.tree)) no_volume();
-    if (2 * band.doubtful_samples > band.inside_samples) {
-      throw Error(Code::BadInput, "the mesh is an open sheet, not the surface of a body", {},
-                  "close it, or give the sheet a thickness");
-    }
-    const Mesh surface = sharp_zero_level(band.tree, params.voxel_mm, mesh, winding, context_);
-    band.tree.reset();
-    return triangle_band(surface, surface_topology(surface), WindingTree(surface), band_, context_.part(0.5, 1, ""))
-        .tree;
-  }
-
-  [[noreturn]] static void no_volume() {
-    throw Error(Code::BadInput, "the mesh encloses no volume at this voxel", {},
-                "close it, give it thickness, or use a smaller --voxel");
-  }
-
-  ToSolidResult result(openvdb::FloatTree::Ptr tree) {
-    if (!has_inside(*tree)) no_volume();
-    auto grid = make_grid(params_.grid);
-    grid->setTree(std::move(tree));
-    context_.progress(1);
-    return {make_solid(std::move(grid), params_.grid), std::move(repairs_)};
-  }
-
-  const ToSolidParams params_;
-  const Context& context_;
-  BandParams band_;
+  const BandParams params_;
+  std::unique_ptr<Surface> surface_;
+  std::unique_ptr<TriangleBand> band_;
+  bool replaced_ = false;
   std::vector<std::string> repairs_;
 };
+
+Solid as_solid(openvdb::FloatTree::Ptr tree, Grid spec) {
+  auto grid = make_grid(spec);
+  grid->setTree(std::move(tree));
+  return make_solid(std::move(grid), spec);
+}
 
 }  // namespace
 
 ToSolidResult to_solid(const Mesh& mesh, const ToSolidParams& params, const Context& context) {
   validate(mesh, params);
   initialize_openvdb();
-  return Conversion(params, context).run(mesh);
+  const std::shared_ptr<const Mesh> lent(std::shared_ptr<const Mesh>(), &mesh);
+  Conversion conversion(lent, params, context.part(0, 0.3, ""));
+  Band band = conversion.look(&TriangleBand::whole, context.part(0.3, 1, ""));
+  if (!has_inside(*band.tree)) no_volume();
+  return {as_solid(std::move(band.tree), params.grid), conversion.repairs()};
+}
+
+struct MeshVoxels::Impl {
+  Grid spec;
+  Conversion conversion;
+};
+
+MeshVoxels::MeshVoxels(const Mesh& mesh, const ToSolidParams& params, const Context& context) {
+  validate(mesh, params);
+  initialize_openvdb();
+  Conversion conversion(std::make_shared<const Mesh>(mesh), params, context.part(0, 0.3, ""));
+  conversion.look(&TriangleBand::survey, context.part(0.3, 1, ""));
+  impl_ = std::make_shared<const Impl>(Impl{params.grid, std::move(conversion)});
+}
+
+SampleBox MeshVoxels::samples() const {
+  const openvdb::CoordBBox box = impl_->conversion.band().samples();
+  return {{box.min().x(), box.min().y(), box.min().z()}, {box.max().x() + 1, box.max().y() + 1, box.max().z() + 1}};
+}
+
+const std::vector<std::string>& MeshVoxels::repairs() const { return impl_->conversion.repairs(); }
+
+Solid MeshVoxels::within(const SampleBox& box, const Context& context) const {
+  const auto down = [](int v) { return v & ~7; };
+  const openvdb::Coord low(down(box.min.x), down(box.min.y), down(box.min.z));
+  const openvdb::Coord high(down(box.max.x + 7) - 1, down(box.max.y + 7) - 1, down(box.max.z + 7) - 1);
+  return as_solid(impl_->conversion.band().within({low, high}, context), impl_->spec);
 }
 
 }  // namespace fibrolite

@@ -27,6 +27,7 @@ namespace {
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 using openvdb::Coord;
+using openvdb::CoordBBox;
 
 constexpr int cell_size = TriangleCells::size;
 /// Blocks of 8 and less that the surface may cross need every triangle this near (voxels): their corners are at
@@ -40,6 +41,9 @@ constexpr float rounding_vox = 1e-4F, nudge_vox = 1e-3F;
 /// Voxels from the surface w = 1/2 per unit of winding number, where no triangle tells the distance.
 constexpr float voxels_per_turn = 4;
 
+CoordBBox everywhere() { return CoordBBox::inf(); }
+
+CoordBBox cube(const Coord& origin, int size) { return CoordBBox::createCube(origin, size); }
 Coord cells_to_samples(int x, int y, int z) { return {x * cell_size, y * cell_size, z * cell_size}; }
 
 enum Side : int { Inside = -1, Crossed = 0, Outside = 1 };
@@ -61,7 +65,9 @@ struct Scratch {
   std::vector<std::uint32_t> lists[4];  ///< For children of 32, 16, 8 and 4.
 };
 
-class Builder {
+}  // namespace
+
+class TriangleBand::Builder {
  public:
   Builder(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding, const BandParams& params)
       : mesh_(mesh),
@@ -69,17 +75,56 @@ class Builder {
         winding_(winding),
         params_(params),
         scale_(1 / params.voxel_mm),
-        reach_crossed_(std::max({params.outside_vox, params.inside_vox, crossed_reach})) {}
+        reach_crossed_(std::max({params.outside_vox, params.inside_vox, crossed_reach})),
+        cells_(triangle_cells(mesh, params.voxel_mm, reach_crossed_ + search_margin)),
+        settled_(cells_.cells.size(), params.by_winding) {
+    for (std::size_t i = 0; i < cells_.cells.size(); ++i) place_[cells_.cells[i].origin] = i;
+  }
 
-  Band run(const Context& context) {
-    cells_ = triangle_cells(mesh_, params_.voxel_mm, reach_crossed_ + search_margin);
+  Band whole(const Context& context) {
     std::vector<std::size_t> all(cells_.cells.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    band_.tree = std::make_shared<Tree>(static_cast<float>(params_.voxel_mm) * params_.outside_vox);
-    put(fill(all, params_.by_winding, context.part(0, 0.9, "")));
-    if (!params_.by_winding) settle(context);
+    Band band{.tree = empty_tree()};
+    put(fill(all, everywhere(), context.part(0, 0.9, "")), everywhere(), band);
+    if (!params_.by_winding) settle(band, context);
     context.progress(1);
-    return std::move(band_);
+    return band;
+  }
+
+  Band survey(const Context& context) {
+    Band total;
+    const CoordBBox all = samples();
+    const int rows = (all.dim().x() + cell_size - 1) / cell_size;
+    for (bool changed = true; changed && !total.overlap;) {
+      std::vector<std::size_t> again;
+      for (int row = 0; row < rows && !total.overlap; ++row) {
+        // With a block on either side, so that each two neighbours are seen together.
+        CoordBBox box = all;
+        box.min().x() = all.min().x() + row * cell_size - 8;
+        box.max().x() = all.min().x() + (row + 1) * cell_size + 7;
+        Band band{.tree = empty_tree()};
+        put(fill(cells_in(box), box, context.part(0.9 * row / rows, 0.9 * (row + 1) / rows, "")), box, band);
+        total.overlap = total.overlap || band.overlap;
+        const std::vector<std::size_t> found = contradicted(band, box);
+        again.insert(again.end(), found.begin(), found.end());
+      }
+      for (const std::size_t i : again) settled_[i] = true;
+      changed = !again.empty();
+    }
+    total.cells_by_winding = std::count(settled_.begin(), settled_.end(), true);
+    return total;
+  }
+
+  [[nodiscard]] Tree::Ptr within(const CoordBBox& box, const Context& context) const {
+    Band band{.tree = empty_tree()};
+    put(fill(cells_in(box), box, context), box, band);
+    return band.tree;
+  }
+
+  [[nodiscard]] CoordBBox samples() const {
+    CoordBBox box;
+    for (const TriangleCells::Cell& cell : cells_.cells) box.expand(cell.origin, static_cast<unsigned>(cell.size));
+    return box;
   }
 
  private:
@@ -130,7 +175,20 @@ class Builder {
 
   // ---- cells ----
 
-  [[nodiscard]] std::vector<Cell> fill(const std::vector<std::size_t>& which, bool by_winding,
+  [[nodiscard]] Tree::Ptr empty_tree() const {
+    return std::make_shared<Tree>(static_cast<float>(params_.voxel_mm) * params_.outside_vox);
+  }
+
+  [[nodiscard]] std::vector<std::size_t> cells_in(const CoordBBox& box) const {
+    std::vector<std::size_t> which;
+    for (std::size_t i = 0; i < cells_.cells.size(); ++i) {
+      if (box.hasOverlap(cube(cells_.cells[i].origin, cells_.cells[i].size))) which.push_back(i);
+    }
+    return which;
+  }
+
+  /// Only blocks in `box` are made.
+  [[nodiscard]] std::vector<Cell> fill(const std::vector<std::size_t>& which, const CoordBBox& box,
                                        const Context& context) const {
     std::vector<Cell> results(which.size());
     tbb::enumerable_thread_specific<Scratch> scratch;
@@ -138,66 +196,71 @@ class Builder {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, which.size(), 1), [&](const auto& range) {
       for (std::size_t i = range.begin(); i < range.end(); ++i) {
         context.check();
-        fill_cell(cells_.cells[which[i]], by_winding, scratch.local(), results[i]);
+        fill_cell(cells_.cells[which[i]], settled_[which[i]], box, scratch.local(), results[i]);
         context.progress(static_cast<double>(++done) / static_cast<double>(which.size()));
       }
     });
     return results;
   }
 
-  void put(std::vector<Cell> cells) {
+  void put(std::vector<Cell> cells, const CoordBBox& box, Band& band) const {
     const float inner = -static_cast<float>(params_.voxel_mm) * params_.inside_vox;
-    openvdb::tree::ValueAccessor<Tree> accessor(*band_.tree);
+    openvdb::tree::ValueAccessor<Tree> accessor(*band.tree);
     for (Cell& cell : cells) {
       for (auto& leaf : cell.leaves) accessor.addLeaf(leaf.release());
       for (const Tile& tile : cell.inner) {
-        if (tile.size == 2 * cell_size) {
+        CoordBBox part = cube(tile.origin, tile.size);
+        if (tile.size == 2 * cell_size && box.isInside(part)) {
           accessor.addTile(2, tile.origin, inner, false);
           continue;
         }
-        for (int x = 0; x < tile.size; x += 8) {
-          for (int y = 0; y < tile.size; y += 8) {
-            for (int z = 0; z < tile.size; z += 8) accessor.addTile(1, tile.origin + Coord(x, y, z), inner, false);
+        part.intersect(box);
+        for (int x = part.min().x(); x <= part.max().x(); x += 8) {
+          for (int y = part.min().y(); y <= part.max().y(); y += 8) {
+            for (int z = part.min().z(); z <= part.max().z(); z += 8) accessor.addTile(1, Coord(x, y, z), inner, false);
           }
         }
       }
-      band_.inside_samples += cell.inside_samples;
-      band_.doubtful_samples += cell.doubtful_samples;
-      band_.overlap = band_.overlap || cell.overlap;
+      band.inside_samples += cell.inside_samples;
+      band.doubtful_samples += cell.doubtful_samples;
+      band.overlap = band.overlap || cell.overlap;
     }
+  }
+
+  /// Cells with sides that contradict each other or their neighbours', not yet settled by winding number; sorted.
+  [[nodiscard]] std::vector<std::size_t> contradicted(const Band& band, const CoordBBox& box) const {
+    std::vector<std::size_t> found;
+    for (const Coord& block : contradictions(*band.tree, params_.voxel_mm, box)) {
+      auto cell = place_.find(block & ~(cell_size - 1));
+      if (cell == place_.end()) cell = place_.find(block & ~(2 * cell_size - 1));
+      if (cell != place_.end() && !settled_[cell->second]) found.push_back(cell->second);
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
   }
 
   /// Where a surface meets itself, the closest feature may tell the wrong side. Sides that contradict each other show
   /// it: their cells are filled again by winding number, and so on while that contradicts their neighbours.
-  void settle(const Context& context) {
-    std::vector<bool> settled(cells_.cells.size(), false);
-    std::map<Coord, std::size_t> place;
-    for (std::size_t i = 0; i < cells_.cells.size(); ++i) place[cells_.cells[i].origin] = i;
-    while (!band_.overlap) {
+  void settle(Band& band, const Context& context) {
+    while (!band.overlap) {
       context.check();
-      std::vector<std::size_t> again;
-      for (const Coord& block : contradictions(*band_.tree, params_.voxel_mm)) {
-        auto cell = place.find(block & ~(cell_size - 1));
-        if (cell == place.end()) cell = place.find(block & ~(2 * cell_size - 1));
-        if (cell == place.end() || settled[cell->second]) continue;
-        settled[cell->second] = true;
-        again.push_back(cell->second);
-      }
+      const std::vector<std::size_t> again = contradicted(band, everywhere());
       if (again.empty()) return;
-      std::sort(again.begin(), again.end());
-      band_.cells_by_winding += static_cast<std::int64_t>(again.size());
-      openvdb::tree::ValueAccessor<Tree> accessor(*band_.tree);
+      band.cells_by_winding += static_cast<std::int64_t>(again.size());
+      openvdb::tree::ValueAccessor<Tree> accessor(*band.tree);
       for (const std::size_t i : again) {
+        settled_[i] = true;
         const TriangleCells::Cell& cell = cells_.cells[i];
         for (int x = 0; x < cell.size; x += 8) {
           for (int y = 0; y < cell.size; y += 8) {
             for (int z = 0; z < cell.size; z += 8) {
-              accessor.addTile(1, cell.origin + Coord(x, y, z), band_.tree->background(), false);
+              accessor.addTile(1, cell.origin + Coord(x, y, z), band.tree->background(), false);
             }
           }
         }
       }
-      put(fill(again, true, context.part(0.9, 1, "")));
+      put(fill(again, everywhere(), context.part(0.9, 1, "")), everywhere(), band);
     }
   }
 
@@ -205,11 +268,13 @@ class Builder {
     Vec3d cell_center;  ///< Voxels.
     Coord cell_middle;  ///< The sample just above the centre.
     bool by_winding;
+    const CoordBBox& box;  ///< What is wanted.
     Scratch& scratch;
     Cell& result;
   };
 
-  void fill_cell(const TriangleCells::Cell& job, bool by_winding, Scratch& scratch, Cell& result) const {
+  void fill_cell(const TriangleCells::Cell& job, bool by_winding, const CoordBBox& box, Scratch& scratch,
+                 Cell& result) const {
     const double half = 0.5 * (job.size - 1);
     const Vec3d center{job.origin.x() + half, job.origin.y() + half, job.origin.z() + half};
     if (job.count == 0) {
@@ -218,8 +283,8 @@ class Builder {
       if (side != Crossed) return;
       if (job.size > cell_size) {
         for (int k = 0; k < 8; ++k) {
-          fill_cell({job.origin + cells_to_samples(k >> 2, k >> 1 & 1, k & 1), cell_size, 0, 0}, by_winding, scratch,
-                    result);
+          fill_cell({job.origin + cells_to_samples(k >> 2, k >> 1 & 1, k & 1), cell_size, 0, 0}, by_winding, box,
+                    scratch, result);
         }
         return;
       }
@@ -233,7 +298,7 @@ class Builder {
           make_frame(in_voxels(t[0]) - center, in_voxels(t[1]) - center, in_voxels(t[2]) - center, triangle));
       scratch.all.push_back(static_cast<std::uint32_t>(i));
     }
-    const Block block{center, job.origin + Coord(cell_size / 2), by_winding, scratch, result};
+    const Block block{center, job.origin + Coord(cell_size / 2), by_winding, box, scratch, result};
     split(block, {}, cell_size, Crossed, scratch.all.data(), static_cast<int>(job.count),
           reach_crossed_ + search_margin);
   }
@@ -303,6 +368,7 @@ class Builder {
         return static_cast<int>(std::lround(x - c.boxes.half + 0.5F * (cell_size - 1))) - cell_size / 2;
       };
       const Coord origin = block.cell_middle + Coord(low(p.x), low(p.y), low(p.z));
+      if (!block.box.hasOverlap(cube(origin, child))) continue;
       if (c.side[k] != Crossed && c.counts[k] == 0) {
         if (c.side[k] == Inside) block.result.inner.push_back({origin, child});
       } else if (child > 8) {
@@ -428,15 +494,21 @@ class Builder {
   const BandParams params_;
   const double scale_;
   const float reach_crossed_;
-  TriangleCells cells_;
-  Band band_;
+  const TriangleCells cells_;
+  std::map<Coord, std::size_t> place_;  ///< Of each cell, by its origin.
+  std::vector<bool> settled_;           ///< Cells whose sides are told by winding number.
 };
 
-}  // namespace
+TriangleBand::TriangleBand(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding,
+                           const BandParams& params)
+    : builder_(std::make_unique<Builder>(mesh, topology, winding, params)) {}
+TriangleBand::~TriangleBand() = default;
 
-Band triangle_band(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding,
-                   const BandParams& params, const Context& context) {
-  return Builder(mesh, topology, winding, params).run(context);
+Band TriangleBand::whole(const Context& context) { return builder_->whole(context); }
+Band TriangleBand::survey(const Context& context) { return builder_->survey(context); }
+openvdb::FloatTree::Ptr TriangleBand::within(const CoordBBox& box, const Context& context) const {
+  return builder_->within(box, context);
 }
+CoordBBox TriangleBand::samples() const { return builder_->samples(); }
 
 }  // namespace fibrolite

@@ -4,6 +4,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <memory>
+
 #include "fibrolite/context.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/winding.h"
@@ -28,7 +30,28 @@ struct Band {
   std::int64_t cells_by_winding = 0;  ///< Cells of 64^3 samples with contradictions, decided by winding number.
   bool overlap = false;  ///< The mesh overlaps itself by more than a voxel (seen where the winding number was asked).
 };
-[[nodiscard]] Band triangle_band(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding,
-                                 const BandParams& params, const Context& context);
+/// Finds the band whole, or box by box. Holds references: mesh, topology and winding must outlive it.
+class TriangleBand {
+ public:
+  /// Cost: O(triangles + cells).
+  TriangleBand(const Mesh& mesh, const SurfaceTopology& topology, const WindingTree& winding, const BandParams& params);
+  ~TriangleBand();
+  TriangleBand(const TriangleBand&) = delete;
+  TriangleBand& operator=(const TriangleBand&) = delete;
+
+  [[nodiscard]] Band whole(const Context& context);
+  /// Finds out what whole() would decide by winding number, holding a row of cells at a time; gives the band's totals,
+  /// no tree. Cost: as whole(); again for every round in which new contradictions show.
+  [[nodiscard]] Band survey(const Context& context);
+  /// The samples in `box` (whole blocks of 8), bit for bit as in whole(). After a survey() if not by winding.
+  /// Thread-safe.
+  [[nodiscard]] openvdb::FloatTree::Ptr within(const openvdb::CoordBBox& box, const Context& context) const;
+  /// Holds every sample that is inside or in the band; whole blocks of 8.
+  [[nodiscard]] openvdb::CoordBBox samples() const;
+
+ private:
+  class Builder;
+  std::unique_ptr<Builder> builder_;
+};
 
 }  // namespace fibrolite

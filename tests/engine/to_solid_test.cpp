@@ -335,6 +335,77 @@ TEST(ToSolid, horse_is_the_same_either_way_round_and_keeps_its_volume) {
 
 // ---- errors ----
 
+/// One block of 8 of a solid: its values, or the one that stands for all.
+std::vector<float> block_of(const openvdb::FloatTree& tree, const openvdb::Coord& origin) {
+  if (const auto* leaf = tree.probeConstLeaf(origin)) return {leaf->buffer().data(), leaf->buffer().data() + 512};
+  return {tree.getValue(origin)};
+}
+
+/// Cut into slabs along an axis, the mesh gives the same samples as whole, and none beyond each slab.
+void expect_same_in_slabs(const Mesh& mesh, const ToSolidParams& params, std::size_t axis, int thickness) {
+  const ToSolidResult whole = to_solid(mesh, params);
+  const MeshVoxels voxels(mesh, params);
+  EXPECT_EQ(voxels.repairs(), whole.repairs);
+  const SampleBox all = voxels.samples();
+  const openvdb::Coord low(all.min.x, all.min.y, all.min.z), high(all.max.x, all.max.y, all.max.z);
+  const auto wanted = to_vdb(whole.solid);
+  openvdb::Index64 leaves = 0;
+  for (int at = low[axis]; at < high[axis]; at += thickness) {
+    openvdb::Coord from = low, to = high;
+    from[axis] = at;
+    to[axis] = std::min(at + thickness, high[axis]);
+    const Solid slab = voxels.within({{from.x(), from.y(), from.z()}, {to.x(), to.y(), to.z()}});
+    const auto got = to_vdb(slab);
+    leaves += got->tree().leafCount();
+    for (int x = from.x(); x < to.x(); x += 8) {
+      for (int y = from.y(); y < to.y(); y += 8) {
+        for (int z = from.z(); z < to.z(); z += 8) {
+          const openvdb::Coord origin(x, y, z);
+          ASSERT_EQ(block_of(got->tree(), origin), block_of(wanted->tree(), origin)) << origin;
+        }
+      }
+    }
+    openvdb::Coord beyond = from;
+    const std::size_t across = (axis + 1) % 3;
+    beyond[axis] = to[axis];
+    for (; beyond[across] < high[across]; beyond[across] += 8)
+      ASSERT_EQ(got->tree().getValue(beyond), got->background());
+  }
+  EXPECT_EQ(leaves, wanted->tree().leafCount());
+}
+
+TEST(MeshVoxels, slabs_of_any_thickness_add_up_to_the_whole_bit_for_bit) {
+  const ToSolidParams params{.grid = {.voxel_mm = 0.2}, .inside_band_mm = 1.1};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const int thickness : {8, 40, 128}) expect_same_in_slabs(testing::icosphere(15, 3), params, axis, thickness);
+  }
+}
+
+TEST(MeshVoxels, wide_tiles_are_cut_where_a_slab_ends) {
+  expect_same_in_slabs(cube(70, {1.3, 2.1, 3.7}), {.grid = {.voxel_mm = 0.25}}, 2, 56);
+}
+
+TEST(MeshVoxels, surfaces_that_cut_themselves_get_the_same_sides_in_slabs) {
+  // Tubes that cross: their walls inside the other body contradict each other there.
+  const Mesh upright = testing::tube(4, 30, 40, {0, 0, -15}), lying = testing::turned(upright, 0, 1);
+  expect_same_in_slabs(testing::joined(upright, lying), {.grid = {.voxel_mm = 0.25}, .inside_band_mm = 1}, 0, 24);
+  // Cubes that share an edge, and one that is open.
+  const Mesh touching = testing::joined(cube(10, {0.1, 0.1, 0.1}), cube(10, {10.1, 10.1, 0.1}));
+  expect_same_in_slabs(touching, {.grid = {.voxel_mm = 0.25}}, 1, 16);
+  expect_same_in_slabs(testing::without_triangle(cube(10), 3), {.grid = {.voxel_mm = 0.25}}, 2, 16);
+}
+
+TEST(MeshVoxels, real_models_in_slabs) {
+  int found = 0;
+  for (const char* file : {"horse.ply", "monkey.obj", "armadillo.obj", "bunny-open.obj"}) {
+    const auto path = testing::shared_model(file);
+    if (!path) continue;
+    ++found;
+    expect_same_in_slabs(scaled_to(read_mesh(*path).mesh, 60), {.grid = {.voxel_mm = 0.4}, .inside_band_mm = 1}, 2, 64);
+  }
+  if (found == 0) GTEST_SKIP() << "the folder of real meshes is missing";
+}
+
 Code code_of(const Mesh& mesh, const ToSolidParams& params) {
   try {
     (void)to_solid(mesh, params);

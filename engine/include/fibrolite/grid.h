@@ -2,6 +2,8 @@
 // How a solid is sampled.
 #pragma once
 
+#include "fibrolite/vec.h"
+
 namespace fibrolite {
 
 /// Sample (i, j, k) lies at voxel_mm * (i, j, k) in world mm: every Grid of one voxel size shares one lattice.
@@ -9,6 +11,12 @@ struct Grid {
   double voxel_mm = 0.25;  ///< Voxel edge, mm; > 0.
   float band_vox = 3;      ///< Half width of the narrow band, voxels; 2 or more.
   friend constexpr bool operator==(const Grid&, const Grid&) = default;
+};
+
+/// Samples (i, j, k) with min <= (i, j, k) < max on each axis.
+struct SampleBox {
+  Vec3i min{}, max{};
+  friend constexpr bool operator==(const SampleBox&, const SampleBox&) = default;
 };
 
 }  // namespace fibrolite

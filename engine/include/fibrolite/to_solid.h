@@ -2,6 +2,7 @@
 // Mesh -> Solid: exact distance in a band, with a sign that survives holes and self-intersections.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -25,5 +26,25 @@ struct ToSolidResult {
 /// voxel); BadRecipe: voxel or band out of range; TooLarge: more than 2^31 voxels along an axis. Cost: O(triangles +
 /// band voxels), parallel; the same bits on any number of threads.
 [[nodiscard]] ToSolidResult to_solid(const Mesh& mesh, const ToSolidParams& params, const Context& context = {});
+
+/// The same solid a box at a time, for models whose whole band is too large for memory. Immutable, thread-safe; copies
+/// are cheap.
+class MeshVoxels {
+ public:
+  /// Looks at the whole band once, a row of it in memory at a time, so that each box gets the same sides as the whole.
+  /// A mesh that is open or overlaps itself is replaced by its outermost surface at this voxel, which must fit into
+  /// memory. Errors as of to_solid(), but for a mesh without volume, which is not noticed. Cost: as to_solid().
+  MeshVoxels(const Mesh& mesh, const ToSolidParams& params, const Context& context = {});
+  /// Holds every sample that is inside or in the band.
+  [[nodiscard]] SampleBox samples() const;
+  [[nodiscard]] const std::vector<std::string>& repairs() const;
+  /// to_solid()'s samples in the blocks of 8 that the box touches, bit for bit; nothing beyond them. Cost: in
+  /// proportion to the band in the box, parallel.
+  [[nodiscard]] Solid within(const SampleBox& box, const Context& context = {}) const;
+
+ private:
+  struct Impl;
+  std::shared_ptr<const Impl> impl_;
+};
 
 }  // namespace fibrolite
