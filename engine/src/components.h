@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// Connected components: each 8x8x8 block is labelled on its own, in parallel, then labels are joined across block
+// faces.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/solid.h"
+#include "vdb_access.h"
+
+namespace fibrolite {
+
+/// One leaf's labels, dense from 0 in scan order.
+struct LeafLabels {
+  static constexpr std::size_t size = 512;
+  std::array<std::uint16_t, size> label;
+  std::vector<std::uint16_t> voxels;  // per label
+  std::vector<std::uint16_t> first;   // per label: its first voxel
+};
+
+/// Whole blocks of 8 along one axis: samples low <= (i, j, k)[axis] < high, both multiples of 8.
+struct SampleRange {
+  int axis = 0, low = 0, high = 0;
+};
+
+/// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what reads less
+/// than `below`, 0 or a depth within the band. Of a range, only its blocks are looked at, and there is no layer beyond
+/// its two ends: what lies there is not known.
+class Components {
+ public:
+  using Tree = openvdb::FloatTree;
+  using Leaf = Tree::LeafNodeType;
+  using Id = std::uint32_t;
+
+  Components(const Solid& solid, const Context& context, float below = 0, const SampleRange* range = nullptr);
+
+  [[nodiscard]] bool empty() const { return offset_.empty(); }
+
+  struct Component {
+    Id id;
+    bool inside;
+    std::int64_t voxels;
+    openvdb::Coord first;
+  };
+  /// Joined components in scan order of their first voxel. The exterior is the first of all.
+  [[nodiscard]] std::vector<Component> list() const;
+
+  /// Root id of a sample; samples outside the box belong to the exterior.
+  [[nodiscard]] Id at(const openvdb::Coord& ijk) const;
+  [[nodiscard]] bool inside(const openvdb::Coord& ijk) const {
+    return solid_.impl().grid->tree().getValue(ijk) < below_;
+  }
+
+  /// Calls visit(origin, leaf labels or null for a tile, global id of label 0) for each block, in scan order.
+  template <class Visit>
+  void each_block(const Visit& visit) const {
+    for (std::size_t b = 0; b < block_.size(); ++b) {
+      visit(origin(b), block_[b] >= 0 ? &leaves_[static_cast<std::size_t>(block_[b])] : nullptr, offset_[b]);
+    }
+  }
+  [[nodiscard]] Id find(Id i) const {
+    while (parent_[i] != i) i = parent_[i];
+    return i;
+  }
+
+ private:
+  static constexpr std::int32_t void_tile = -1, full_tile = -2;
+
+  [[nodiscard]] std::size_t index(const openvdb::Coord& b) const {
+    return (static_cast<std::size_t>(b.x()) * static_cast<std::size_t>(n_.y()) + static_cast<std::size_t>(b.y())) *
+               static_cast<std::size_t>(n_.z()) +
+           static_cast<std::size_t>(b.z());
+  }
+  [[nodiscard]] openvdb::Coord origin(std::size_t b) const;
+  void find_blocks(const Tree& tree);
+  void label(const Context& context);
+  void join();
+  void join_faces(std::size_t a, std::size_t b, unsigned axis);
+  void unite(Id a, Id b);
+  Id root_of(Id i);
+
+  Solid solid_;
+  float below_;
+  openvdb::Coord low_, n_;
+  std::vector<std::int32_t> block_;  // leaf number or a tile kind
+  std::vector<const Leaf*> tree_leaves_;
+  std::vector<LeafLabels> leaves_;
+  std::vector<Id> offset_;  // first global id of each block
+  std::vector<Id> parent_;
+};
+
+}  // namespace fibrolite
