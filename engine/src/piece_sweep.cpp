@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fibrolite/piece_sweep.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "components.h"
+
+namespace fibrolite {
+namespace {
+
+using Id = std::uint32_t;
+using Tree = Components::Tree;
+using openvdb::Coord;
+
+constexpr Id exterior = 0;
+
+std::tuple<int, int, int> key(const Vec3i& v) { return {v.x, v.y, v.z}; }
+
+/// What is known of a set of samples that hang together.
+struct Set {
+  bool inside = false, held = false;
+  std::int64_t voxels = 0;
+  Coord first{};
+  openvdb::CoordBBox box{};
+  std::vector<Flips::Block> samples;  ///< All of them, as long as they are few.
+};
+
+/// Order of first samples: by block, x slowest, then within it.
+bool earlier(const Coord& a, const Coord& b) {
+  const Coord block_a = a & ~7, block_b = b & ~7;
+  return std::tie(block_a, a) < std::tie(block_b, b);
+}
+
+/// The last layer of samples of a block, as seen by the next slab.
+struct Face {
+  std::array<Id, 64> id;
+  std::uint64_t inside = 0;
+};
+
+}  // namespace
+
+struct PieceSweep::Impl {
+  Impl(Grid g, const Params& p)
+      : grid(g),
+        params(p),
+        axis(static_cast<std::size_t>(p.axis)),
+        few(std::max(p.clean.drop_below_vox, p.clean.fill_below_vox)) {
+    make(false);  // the exterior
+  }
+
+  Id make(bool inside) {
+    parent.push_back(static_cast<Id>(parent.size()));
+    sets.emplace_back().inside = inside;
+    return parent.back();
+  }
+  Id root(Id i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  }
+  void join(Id a, Id b) {
+    a = root(a);
+    b = root(b);
+    if (a == b) return;
+    if (a > b) std::swap(a, b);
+    parent[b] = a;
+    Set &to = sets[a], &from = sets[b];
+    if (to.voxels == 0 || (from.voxels > 0 && earlier(from.first, to.first))) to.first = from.first;
+    to.voxels += from.voxels;
+    to.held = to.held || from.held;
+    to.box.expand(from.box);
+    if (a == exterior || to.voxels >= few) {
+      to.samples = {};
+    } else {
+      to.samples.insert(to.samples.end(), from.samples.begin(), from.samples.end());
+    }
+    from = {};
+  }
+
+  /// Place of a block across the axis.
+  [[nodiscard]] std::pair<int, int> across(const Coord& origin) const {
+    return {origin[(axis + 1) % 3], origin[(axis + 2) % 3]};
+  }
+  /// Sample `n` of a block's first or last layer.
+  [[nodiscard]] std::size_t sample(unsigned n, bool last) const {
+    constexpr std::array<unsigned, 3> stride{64, 8, 1};
+    return (last ? 7 * stride[axis] : 0) + (n >> 3) * stride[(axis + 1) % 3] + (n & 7U) * stride[(axis + 2) % 3];
+  }
+
+  void join_faces(const Face& a, const Face& b) {
+    for (std::size_t n = 0; n < 64; ++n) {
+      const bool repeats = n > 0 && a.id[n] == a.id[n - 1] && b.id[n] == b.id[n - 1];
+      if (repeats || ((a.inside ^ b.inside) >> n & 1U) != 0) continue;
+      join(a.id[n], b.id[n]);
+    }
+  }
+  static Face outside() {
+    Face face;
+    face.id.fill(exterior);
+    return face;
+  }
+
+  void add(const Solid& solid, const SampleRange& range, const Shape& anchor, const Context& context) {
+    const Components components(solid, context, static_cast<float>(params.below), &range);
+    std::map<std::pair<int, int>, Face> next;
+    if (!components.empty()) take(components, range, anchor, next);
+    // What the slab below left open, against this one's first layer or the exterior.
+    for (const auto& [place, face] : faces) join_faces(face, outside_if_absent(first_layer, place));
+    for (const auto& [place, face] : first_layer)
+      if (faces.find(place) == faces.end()) join_faces(face, outside());
+    first_layer.clear();
+    faces = std::move(next);
+  }
+  static Face outside_if_absent(const std::map<std::pair<int, int>, Face>& layer, const std::pair<int, int>& place) {
+    const auto found = layer.find(place);
+    return found != layer.end() ? found->second : outside();
+  }
+
+  void take(const Components& components, const SampleRange& range, const Shape& anchor,
+            std::map<std::pair<int, int>, Face>& next) {
+    // The slab's components get numbers of their own.
+    const auto list = components.list();
+    std::map<Id, Id> number{{list.front().id, exterior}};
+    bool any_few = false;
+    for (std::size_t i = 1; i < list.size(); ++i) {
+      const Id id = make(list[i].inside);
+      number[list[i].id] = id;
+      sets[id].voxels = list[i].voxels;
+      sets[id].first = list[i].first;
+      any_few = any_few || list[i].voxels < few;
+    }
+    std::vector<Id> id;
+    components.each_block([&](const Coord& origin, const LeafLabels* labels, Id offset) {
+      const std::size_t kinds = labels != nullptr ? labels->voxels.size() : 1;
+      id.resize(kinds);
+      bool all_outside = true;
+      for (std::size_t k = 0; k < kinds; ++k) {
+        id[k] = number.at(components.find(offset + static_cast<Id>(k)));
+        all_outside = all_outside && id[k] == exterior;
+      }
+      if (all_outside) return;
+      const auto box = openvdb::CoordBBox::createCube(origin, 8);
+      for (const Id i : id) sets[i].box.expand(box);
+      if (any_few) remember(origin, labels, id);
+      if (origin[axis] == range.low) first_layer.emplace(across(origin), face(labels, id, false));
+      if (origin[axis] == range.high - 8) next.emplace(across(origin), face(labels, id, true));
+      hold(origin, labels, id, anchor);
+    });
+  }
+
+  [[nodiscard]] Face face(const LeafLabels* labels, const std::vector<Id>& id, bool last) const {
+    Face result;
+    for (unsigned n = 0; n < 64; ++n) {
+      result.id[n] = id[labels != nullptr ? labels->label[sample(n, last)] : 0];
+      result.inside |= std::uint64_t{sets[result.id[n]].inside} << n;
+    }
+    return result;
+  }
+
+  void remember(const Coord& origin, const LeafLabels* labels, const std::vector<Id>& id) {
+    if (labels == nullptr) return;  // a whole block is never few
+    for (std::size_t k = 0; k < id.size(); ++k) {
+      Set& set = sets[id[k]];
+      if (id[k] == exterior || set.voxels >= few) continue;
+      const bool here = !set.samples.empty() && set.samples.back().origin == Vec3i{origin.x(), origin.y(), origin.z()};
+      Flips::Block& block = here ? set.samples.back() : set.samples.emplace_back();
+      block.origin = {origin.x(), origin.y(), origin.z()};
+      for (std::size_t i = 0; i < LeafLabels::size; ++i)
+        if (labels->label[i] == k) block.which[i >> 6] |= std::uint64_t{1} << (i & 63U);
+    }
+  }
+
+  /// Most blocks hold nothing but what is known to be held: no need to ask for the anchor there.
+  void hold(const Coord& origin, const LeafLabels* labels, const std::vector<Id>& id, const Shape& anchor) {
+    const auto open = [&](Id i) { return sets[i].inside && !sets[i].held; };
+    if (std::none_of(id.begin(), id.end(), open)) return;
+    const double h = grid.voxel_mm;
+    const Vec3d low = h * Vec3d{1.0 * origin.x(), 1.0 * origin.y(), 1.0 * origin.z()};
+    if (anchor.bound({low, low + Vec3d{7 * h, 7 * h, 7 * h}}).lo >= 0) return;
+    std::array<float, LeafLabels::size> x, y, z, value;
+    for (std::size_t i = 0; i < LeafLabels::size; ++i) {
+      x[i] = static_cast<float>(h * (origin.x() + static_cast<int>(i >> 6)));
+      y[i] = static_cast<float>(h * (origin.y() + static_cast<int>(i >> 3 & 7U)));
+      z[i] = static_cast<float>(h * (origin.z() + static_cast<int>(i & 7U)));
+    }
+    const Vec3i leaf{origin.x(), origin.y(), origin.z()};
+    anchor.evaluate({x.data(), y.data(), z.data(), PointBlock::capacity, &leaf, h}, value.data());
+    for (std::size_t i = 0; i < LeafLabels::size; ++i) {
+      const Id at = id[labels != nullptr ? labels->label[i] : 0];
+      if (value[i] < 0 && sets[at].inside) sets[at].held = true;
+    }
+  }
+
+  Result finish() {
+    for (const auto& [place, face] : faces) join_faces(face, outside());
+    std::vector<Id> order;
+    for (Id i = 1; i < parent.size(); ++i)
+      if (parent[i] == i) order.push_back(i);
+    std::sort(order.begin(), order.end(), [&](Id a, Id b) { return earlier(sets[a].first, sets[b].first); });
+    Id keep = exterior;
+    for (const Id i : order)
+      if (sets[i].inside && (keep == exterior || sets[i].voxels > sets[keep].voxels)) keep = i;
+
+    Result result;
+    struct Kept {
+      Piece piece;
+      SampleBox box;
+      bool held;
+    };
+    std::vector<Kept> material, cavities;
+    const double h = grid.voxel_mm;
+    for (const Id i : order) {
+      Set& set = sets[i];
+      const bool drop = set.inside && i != keep && set.voxels < params.clean.drop_below_vox;
+      const bool fill = !set.inside && set.voxels < params.clean.fill_below_vox;
+      result.dropped += drop ? 1 : 0;
+      result.filled += fill ? 1 : 0;
+      if (drop || fill) {
+        result.flips.blocks.insert(result.flips.blocks.end(), set.samples.begin(), set.samples.end());
+        continue;
+      }
+      const Vec3d first = h * Vec3d{1.0 * set.first.x(), 1.0 * set.first.y(), 1.0 * set.first.z()};
+      const Coord a = set.box.min(), b = set.box.max().offsetBy(1);
+      (set.inside ? material : cavities)
+          .push_back({{set.voxels, static_cast<double>(set.voxels) * h * h * h, first},
+                      {{a.x(), a.y(), a.z()}, {b.x(), b.y(), b.z()}},
+                      set.held});
+    }
+    const auto larger = [](const Kept& a, const Kept& b) { return a.piece.voxels > b.piece.voxels; };
+    std::stable_sort(material.begin(), material.end(), larger);
+    std::stable_sort(cavities.begin(), cavities.end(), larger);
+    for (const Kept& kept : material) {
+      result.left.material.push_back(kept.piece);
+      result.boxes.push_back(kept.box);
+      if (!kept.held) result.loose.push_back(kept.piece);
+    }
+    for (const Kept& kept : cavities) result.left.cavities.push_back(kept.piece);
+    merge(result.flips.blocks);
+    return result;
+  }
+
+  /// One entry per block.
+  static void merge(std::vector<Flips::Block>& blocks) {
+    std::stable_sort(blocks.begin(), blocks.end(),
+                     [](const Flips::Block& a, const Flips::Block& b) { return key(a.origin) < key(b.origin); });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      if (kept > 0 && blocks[kept - 1].origin == blocks[i].origin) {
+        for (std::size_t w = 0; w < 8; ++w) blocks[kept - 1].which[w] |= blocks[i].which[w];
+      } else {
+        blocks[kept++] = blocks[i];
+      }
+    }
+    blocks.resize(kept);
+  }
+
+  const Grid grid;
+  const Params params;
+  const std::size_t axis;
+  const std::int64_t few;
+  std::vector<Id> parent;
+  std::vector<Set> sets;
+  std::map<std::pair<int, int>, Face> faces, first_layer;
+};
+
+PieceSweep::PieceSweep(Grid grid, const Params& params) : impl_(std::make_shared<Impl>(grid, params)) {}
+
+void PieceSweep::add(const Solid& solid, int low, int high, const Shape& anchor, const Context& context) {
+  impl_->add(solid, {impl_->params.axis, low, high}, anchor, context);
+}
+
+PieceSweep::Result PieceSweep::finish() { return impl_->finish(); }
+
+Solid flipped(const Solid& solid, const Flips& flips) {
+  const Tree& from = solid.impl().grid->tree();
+  openvdb::FloatGrid::Ptr grid;
+  for (const Flips::Block& block : flips.blocks) {
+    const Coord origin(block.origin.x, block.origin.y, block.origin.z);
+    if (from.probeConstLeaf(origin) == nullptr) continue;
+    if (grid == nullptr) grid = solid.impl().grid->deepCopy();
+    float* values = grid->tree().probeLeaf(origin)->buffer().data();
+    for (std::size_t i = 0; i < LeafLabels::size; ++i)
+      if ((block.which[i >> 6] >> (i & 63U) & 1U) != 0) values[i] = -values[i];
+  }
+  return grid == nullptr ? solid : make_solid(grid, solid.grid());
+}
+
+}  // namespace fibrolite
