@@ -2,7 +2,9 @@
 // slice: layers for a printer, straight from the volume; no mesh is made.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "commands.h"
@@ -41,9 +43,10 @@ struct SliceOptions {
 
 /// What is cut into layers. Of a model it is only known how large it is until fill() has made it.
 struct Source {
-  Box3d box;            // in the frame of the print
-  double area_mm2 = 0;  // of its surfaces, roughly: what the size of a file depends on
-  double memory = 0;    // to make it, bytes
+  Box3d box;                      // in the frame of the print
+  double area_mm2 = 0;            // of its surfaces, roughly: what the size of a file depends on
+  double memory = 0;              // to make it, bytes
+  std::optional<SlabPlan> slabs;  // if it does not fit into memory as a whole
   Shape shape;
   double volume_mm3 = 0;
 };
@@ -100,6 +103,42 @@ void check_plates(const SliceOptions& options, const std::vector<SlicePlate>& pl
   }
 }
 
+/// The world axis that layers lie across.
+int axis_of(Up up) {
+  const Vec3d d = direction(up);
+  return d.x != 0 ? 0 : d.y != 0 ? 1 : 2;
+}
+
+/// How the solid is cut if it is too large to be whole; what needs a whole one is refused.
+std::optional<SlabPlan> slabs_for(const SliceOptions& options, const Mesh& model, const HybridizeParams& params,
+                                  double layer_mm, double slicing_bytes) {
+  const double voxel = *params.voxel_mm, allowed = options.run.allowed_bytes();
+  if (predict_memory(model, voxel, params.recipe, options.infill) + slicing_bytes <= allowed) return std::nullopt;
+  const double margin_mm = 0.5 * layer_mm + 4 * voxel;
+  SlabPlan plan = plan_slabs(model, voxel, params.recipe, options.infill, axis_of(options.model.up), margin_mm,
+                             allowed - slicing_bytes);
+  if (plan.memory_bytes + slicing_bytes > allowed || params.recipe.print.drain_mm.value_or(0) > 0)
+    check_memory(model, voxel, params.recipe, options.infill, options.run);
+  return plan;
+}
+
+/// Layers from slab after slab: those whose middle lies in it.
+std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, const Context& context) {
+  return [stream, context](const SlicePlate& plate, int first) mutable {
+    const SlabPlan& plan = stream.plan();
+    const auto slab_of = [&](int layer) {
+      const double middle = (layer + 0.5) * plate.grid.layer_mm;
+      const double at = plate.grid.frame.to_world({0, 0, middle})[plan.axis] / stream.grid().voxel_mm;
+      const auto above = std::upper_bound(plan.borders.begin() + 1, plan.borders.end() - 1, at);
+      return static_cast<std::size_t>(above - plan.borders.begin()) - 1;
+    };
+    const std::size_t slab = slab_of(first);
+    int last = first + 1;
+    while (last < plate.grid.layers && slab_of(last) == slab) ++last;
+    return LayerRun{last, stream.slab(slab, context).printed};
+  };
+}
+
 /// Bytes for each pixel that a surface runs through, measured on a horse full of crystal.
 double bytes_a_cut(SliceFormat format) {
   switch (format) {
@@ -141,7 +180,9 @@ std::string plan(const SliceOptions& options, const Source& source, const std::v
   text += number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) + " mm\n";
   text += layers_text(described(plates)) + "memory    at most ";
   text += memory_text(source.memory + slicing_memory(plates.front().grid)) + " of ";
-  text += memory_text(options.run.allowed_bytes()) + "\n";
+  text += memory_text(options.run.allowed_bytes());
+  if (source.slabs) text += ", in " + std::to_string(source.slabs->borders.size() - 1) + " slabs";
+  text += "\n";
   for (const fs::path& file : options.output.files)
     text +=
         "output    " + file.string() + ", about " + memory_text(expected_bytes(file, plates, source.area_mm2)) + "\n";
@@ -184,9 +225,7 @@ void slice_to_files(const SliceOptions& options) {
     params.recipe.verify.loads = with_paint(std::move(params.recipe.verify.loads), model.painted);
     params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
     check_recipe(params.recipe, *params.voxel_mm, options.infill);
-    check_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run);
     source.box = bounds_in(frame, model.mesh);
-    source.memory = predict_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill);
     const double thinnest = thinnest_mm(params.recipe, options.infill);
     source.area_mm2 = 2 * area(model.mesh);
     if (std::isfinite(thinnest)) source.area_mm2 += 0.16 * std::abs(signed_volume(model.mesh)) / thinnest;
@@ -194,21 +233,32 @@ void slice_to_files(const SliceOptions& options) {
   const std::vector<SlicePlate> plates =
       make_plates(frame, source.box,
                   {options.layer_mm.value_or(0.05), options.pixel_mm.value_or(0.05), options.printer, options.tile});
+  if (!options.from_solid()) {
+    params.slabs =
+        slabs_for(options, model.mesh, params, options.layer_mm.value_or(0.05), slicing_memory(plates.front().grid));
+    source.slabs = params.slabs;
+    source.memory = params.slabs ? params.slabs->memory_bytes
+                                 : predict_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill);
+  }
   check_plates(options, plates, source.memory);
   if (options.run.dry_run) return print(plan(options, source, plates));
 
+  std::optional<SolidStream> stream;
   if (!options.from_solid()) {
     report.infill = name_of(options.infill);
+    params.function = !params.slabs;
     Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.4, "fill"));
     model = {};
     // The function stays; the solid, on which pieces were tied and everything was measured, goes.
     source.shape = std::move(hybrid.printed);
-    source.volume_mm3 = report.solid.volume_mm3;
+    stream = std::move(hybrid.stream);
+  } else {
+    report.solid.volume_mm3 = source.volume_mm3;
   }
-  report.solid.volume_mm3 = source.volume_mm3;
 
-  const SliceJob work{source.shape, plates, options.planes, options.output.files.front().stem().string(),
-                      options.printer ? options.printer->screen : Screen{}};
+  SliceJob work{source.shape, plates, options.planes, options.output.files.front().stem().string(),
+                options.printer ? options.printer->screen : Screen{}};
+  if (stream) work.run_from = from_slabs(*stream, context);
   std::vector<SlicedPlate> done;
   stage("layers", [&] {
     const auto files = static_cast<double>(options.output.files.size());
@@ -219,15 +269,17 @@ void slice_to_files(const SliceOptions& options) {
                           context.part(0.4 + 0.6 * n / files, 0.4 + 0.6 * (n + 1) / files, "layers"));
     }
   });
+  if (stream) stream->finish(report);
   report.slices = described(plates);
   for (std::size_t p = 0; p < plates.size(); ++p) {
     report.slices[p].volume_mm3 = done[p].volume_mm3;
     report.slices[p].area_mm2 = std::move(done[p].area_mm2);
   }
   const double volume_mm3 = report.sliced_mm3();
-  if (std::abs(volume_mm3 - source.volume_mm3) > 0.005 * source.volume_mm3) {
+  const double solid_mm3 = report.solid.volume_mm3;
+  if (std::abs(volume_mm3 - solid_mm3) > 0.005 * solid_mm3) {
     report.warnings.push_back("the layers add up to " + number_text(volume_mm3) + " mm3, the solid has " +
-                              number_text(source.volume_mm3) + " mm3: use thinner layers or smaller pixels or voxels");
+                              number_text(solid_mm3) + " mm3: use thinner layers or smaller pixels or voxels");
   }
   job.finish(options.output.report_path());
   if (!options.run.quiet) print_layers(report, options.targets());

@@ -33,6 +33,12 @@ std::vector<Vec3i> blocks(const Solid& solid) {
   return origins;
 }
 
+std::vector<Vec3i> blocks(const Solid& solid, const SampleRange& range) {
+  std::vector<Vec3i> origins = blocks(solid);
+  std::erase_if(origins, [&](Vec3i origin) { return !range.holds(origin); });
+  return origins;
+}
+
 void for_each_block(const std::vector<Vec3i>& origins, double voxel_mm,
                     const std::function<void(std::size_t, const PointBlock&)>& visit) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, origins.size(), 16), [&](const auto& range) {

@@ -23,11 +23,6 @@ struct LeafLabels {
   std::vector<std::uint16_t> first;   // per label: its first voxel
 };
 
-/// Whole blocks of 8 along one axis: samples low <= (i, j, k)[axis] < high, both multiples of 8.
-struct SampleRange {
-  int axis = 0, low = 0, high = 0;
-};
-
 /// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what reads less
 /// than `below`, 0 or a depth within the band. Of a range, only its blocks are looked at, and there is no layer beyond
 /// its two ends: what lies there is not known.

@@ -36,7 +36,7 @@ bool earlier(const Coord& a, const Coord& b) {
   return std::tie(block_a, a) < std::tie(block_b, b);
 }
 
-/// The last layer of samples of a block, as seen by the next slab.
+/// The layer of samples of a block that the next slab touches.
 struct Face {
   std::array<Id, 64> id;
   std::uint64_t inside = 0;
@@ -85,10 +85,10 @@ struct PieceSweep::Impl {
   [[nodiscard]] std::pair<int, int> across(const Coord& origin) const {
     return {origin[(axis + 1) % 3], origin[(axis + 2) % 3]};
   }
-  /// Sample `n` of a block's first or last layer.
-  [[nodiscard]] std::size_t sample(unsigned n, bool last) const {
+  /// Sample `n` of a block's lowest or highest layer.
+  [[nodiscard]] std::size_t sample(unsigned n, bool upper) const {
     constexpr std::array<unsigned, 3> stride{64, 8, 1};
-    return (last ? 7 * stride[axis] : 0) + (n >> 3) * stride[(axis + 1) % 3] + (n & 7U) * stride[(axis + 2) % 3];
+    return (upper ? 7 * stride[axis] : 0) + (n >> 3) * stride[(axis + 1) % 3] + (n & 7U) * stride[(axis + 2) % 3];
   }
 
   void join_faces(const Face& a, const Face& b) {
@@ -108,7 +108,7 @@ struct PieceSweep::Impl {
     const Components components(solid, context, static_cast<float>(params.below), &range);
     std::map<std::pair<int, int>, Face> next;
     if (!components.empty()) take(components, range, anchor, next);
-    // What the slab below left open, against this one's first layer or the exterior.
+    // What the slab before left open, against this one's first layer or the exterior.
     for (const auto& [place, face] : faces) join_faces(face, outside_if_absent(first_layer, place));
     for (const auto& [place, face] : first_layer)
       if (faces.find(place) == faces.end()) join_faces(face, outside());
@@ -146,16 +146,17 @@ struct PieceSweep::Impl {
       const auto box = openvdb::CoordBBox::createCube(origin, 8);
       for (const Id i : id) sets[i].box.expand(box);
       if (any_few) remember(origin, labels, id);
-      if (origin[axis] == range.low) first_layer.emplace(across(origin), face(labels, id, false));
-      if (origin[axis] == range.high - 8) next.emplace(across(origin), face(labels, id, true));
+      const int first = params.falling ? range.high - 8 : range.low, last = params.falling ? range.low : range.high - 8;
+      if (origin[axis] == first) first_layer.emplace(across(origin), face(labels, id, params.falling));
+      if (origin[axis] == last) next.emplace(across(origin), face(labels, id, !params.falling));
       hold(origin, labels, id, anchor);
     });
   }
 
-  [[nodiscard]] Face face(const LeafLabels* labels, const std::vector<Id>& id, bool last) const {
+  [[nodiscard]] Face face(const LeafLabels* labels, const std::vector<Id>& id, bool upper) const {
     Face result;
     for (unsigned n = 0; n < 64; ++n) {
-      result.id[n] = id[labels != nullptr ? labels->label[sample(n, last)] : 0];
+      result.id[n] = id[labels != nullptr ? labels->label[sample(n, upper)] : 0];
       result.inside |= std::uint64_t{sets[result.id[n]].inside} << n;
     }
     return result;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <deque>
 #include <iterator>
+#include <optional>
 #include <queue>
 #include <utility>
 
@@ -46,6 +47,65 @@ Id main_piece(const std::vector<Components::Component>& list) {
     }
   }
   return best;
+}
+
+/// From one piece, given by its id and a sample, to the nearest other.
+std::optional<Gap> gap_of(const Components& components, Id id, const openvdb::Coord& sample, double voxel,
+                          double reach_mm) {
+  const auto reach = static_cast<int>(std::ceil(reach_mm / voxel));
+  // The piece's samples, then a wave through void that remembers which sample it came from.
+  struct Front {
+    openvdb::Coord at, from;
+  };
+  std::deque<Front> wave;
+  openvdb::MaskTree seen;
+  openvdb::CoordBBox box;
+  std::vector<openvdb::Coord> stack{sample};
+  seen.setValueOn(sample);
+  constexpr std::array<std::array<int, 3>, 6> steps{
+      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
+  while (!stack.empty()) {
+    const openvdb::Coord at = stack.back();
+    stack.pop_back();
+    bool edge = false;
+    for (const auto& s : steps) {
+      const openvdb::Coord to = at.offsetBy(s[0], s[1], s[2]);
+      if (components.at(to) != id) {
+        edge = true;
+      } else if (!seen.isValueOn(to)) {
+        seen.setValueOn(to);
+        stack.push_back(to);
+      }
+    }
+    if (edge) wave.push_back({at, at});
+  }
+  const auto distance2 = [](const openvdb::Coord& a, const openvdb::Coord& b) {
+    const openvdb::Coord d = a - b;
+    return 1.0 * d.x() * d.x() + 1.0 * d.y() * d.y() + 1.0 * d.z() * d.z();
+  };
+  // First by distance, then by place, so that the answer does not depend on how the wave started.
+  const auto later = [&](const Front& a, const Front& b) {
+    const double da = distance2(a.at, a.from), db = distance2(b.at, b.from);
+    return da != db ? da > db : std::pair(a.at, a.from) > std::pair(b.at, b.from);
+  };
+  std::priority_queue<Front, std::vector<Front>, decltype(later)> queue(later,
+                                                                        std::vector<Front>(wave.begin(), wave.end()));
+  while (!queue.empty()) {
+    const Front f = queue.top();
+    queue.pop();
+    if (distance2(f.at, f.from) > 1.0 * reach * reach) break;
+    const Id here = components.at(f.at);
+    if (here != id && components.inside(f.at)) {
+      return Gap{world(f.from, voxel), world(f.at, voxel)};
+    }
+    for (const auto& s : steps) {
+      const openvdb::Coord to = f.at.offsetBy(s[0], s[1], s[2]);
+      if (seen.isValueOn(to)) continue;
+      seen.setValueOn(to);
+      queue.push({to, f.from});
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -186,67 +246,22 @@ std::vector<Gap> gaps(const Solid& solid, double reach_mm, const Context& contex
   if (components.empty()) return result;
   const auto list = components.list();
   const Id keep = main_piece(list);
-  const double voxel = solid.grid().voxel_mm;
-  const auto reach = static_cast<int>(std::ceil(reach_mm / voxel));
-
   for (const auto& piece : list) {
     context.check();
     if (!piece.inside || piece.id == keep) continue;
-    // The piece's samples, then a wave through void that remembers which sample it came from.
-    struct Front {
-      openvdb::Coord at, from;
-    };
-    std::deque<Front> wave;
-    openvdb::MaskTree seen;
-    openvdb::CoordBBox box;
-    std::vector<openvdb::Coord> stack{piece.first};
-    seen.setValueOn(piece.first);
-    constexpr std::array<std::array<int, 3>, 6> steps{
-        {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
-    while (!stack.empty()) {
-      const openvdb::Coord at = stack.back();
-      stack.pop_back();
-      bool edge = false;
-      for (const auto& s : steps) {
-        const openvdb::Coord to = at.offsetBy(s[0], s[1], s[2]);
-        if (components.at(to) != piece.id) {
-          edge = true;
-        } else if (!seen.isValueOn(to)) {
-          seen.setValueOn(to);
-          stack.push_back(to);
-        }
-      }
-      if (edge) wave.push_back({at, at});
-    }
-    const auto distance2 = [](const openvdb::Coord& a, const openvdb::Coord& b) {
-      const openvdb::Coord d = a - b;
-      return 1.0 * d.x() * d.x() + 1.0 * d.y() * d.y() + 1.0 * d.z() * d.z();
-    };
-    // First by distance, then by place, so that the answer does not depend on how the wave started.
-    const auto later = [&](const Front& a, const Front& b) {
-      const double da = distance2(a.at, a.from), db = distance2(b.at, b.from);
-      return da != db ? da > db : std::pair(a.at, a.from) > std::pair(b.at, b.from);
-    };
-    std::priority_queue<Front, std::vector<Front>, decltype(later)> queue(later,
-                                                                          std::vector<Front>(wave.begin(), wave.end()));
-    while (!queue.empty()) {
-      const Front f = queue.top();
-      queue.pop();
-      if (distance2(f.at, f.from) > 1.0 * reach * reach) break;
-      const Id id = components.at(f.at);
-      if (id != piece.id && components.inside(f.at)) {
-        result.push_back({world(f.from, voxel), world(f.at, voxel)});
-        break;
-      }
-      for (const auto& s : steps) {
-        const openvdb::Coord to = f.at.offsetBy(s[0], s[1], s[2]);
-        if (seen.isValueOn(to)) continue;
-        seen.setValueOn(to);
-        queue.push({to, f.from});
-      }
-    }
+    if (const auto gap = gap_of(components, piece.id, piece.first, solid.grid().voxel_mm, reach_mm))
+      result.push_back(*gap);
   }
   return result;
+}
+
+std::optional<Gap> gap_from(const Solid& solid, Vec3d sample_mm, double reach_mm, const Context& context) {
+  const Components components(solid, context);
+  const double voxel = solid.grid().voxel_mm;
+  const auto nearest = [&](double mm) { return static_cast<int>(std::lround(mm / voxel)); };
+  const openvdb::Coord at(nearest(sample_mm.x), nearest(sample_mm.y), nearest(sample_mm.z));
+  if (components.empty() || !components.inside(at)) return std::nullopt;
+  return gap_of(components, components.at(at), at, voxel, reach_mm);
 }
 
 }  // namespace fibrolite

@@ -66,7 +66,7 @@ class Format {
   virtual ~Format() = default;
   Format(const Format&) = delete;
   Format& operator=(const Format&) = delete;
-  [[nodiscard]] virtual Encoded encode(const SlicePlate& plate, int layer) const = 0;
+  [[nodiscard]] virtual Encoded encode(const Shape& shape, const SlicePlate& plate, int layer) const = 0;
   virtual void start() {}
   virtual void take(const SlicePlate& plate, Encoded&& layer) = 0;
   virtual void finish(const std::vector<SlicedPlate>& done) = 0;
@@ -115,8 +115,8 @@ std::string layer_name(const SlicePlate& plate, int layer) {
 class PngArchive : public Format {
  public:
   PngArchive(const SliceJob& job, OutputFile& file) : Format(job), zip_(file) {}
-  [[nodiscard]] Encoded encode(const SlicePlate& plate, int layer) const override {
-    Slice made = slice(job().shape, plate.grid, layer, {.planes = job().planes});
+  [[nodiscard]] Encoded encode(const Shape& shape, const SlicePlate& plate, int layer) const override {
+    Slice made = slice(shape, plate.grid, layer, {.planes = job().planes});
     return {layer, {}, stored_piece(png_upright(shown(std::move(made.coverage)))), made.area_mm2};
   }
   void take(const SlicePlate& plate, Encoded&& layer) override {
@@ -228,8 +228,8 @@ std::string svg_head(const SliceGrid& grid) {
 class SvgArchive final : public Format {
  public:
   SvgArchive(const SliceJob& job, OutputFile& file) : Format(job), zip_(file) {}
-  [[nodiscard]] Encoded encode(const SlicePlate& plate, int layer) const override {
-    const std::vector<Contour> outlines = contours(job().shape, plate.grid, layer);
+  [[nodiscard]] Encoded encode(const Shape& shape, const SlicePlate& plate, int layer) const override {
+    const std::vector<Contour> outlines = contours(shape, plate.grid, layer);
     return {layer,
             {},
             deflate_piece(svg_head(plate.grid) + svg_path(outlines, plate.grid) + "</svg>\n"),
@@ -250,8 +250,8 @@ class SvgArchive final : public Format {
 class SvgFile final : public Format {
  public:
   SvgFile(const SliceJob& job, OutputFile& file) : Format(job), file_(&file) {}
-  [[nodiscard]] Encoded encode(const SlicePlate& plate, int layer) const override {
-    const std::vector<Contour> outlines = contours(job().shape, plate.grid, layer);
+  [[nodiscard]] Encoded encode(const Shape& shape, const SlicePlate& plate, int layer) const override {
+    const std::vector<Contour> outlines = contours(shape, plate.grid, layer);
     std::string text = "<g id=\"layer" + std::to_string(layer);
     text += "\" data-z-mm=\"" + number((layer + 1) * plate.grid.layer_mm) + "\">\n";
     return {layer, text + svg_path(outlines, plate.grid) + "</g>\n", {}, total_area(outlines)};
@@ -270,8 +270,8 @@ class SvgFile final : public Format {
 class CliFile final : public Format {
  public:
   CliFile(const SliceJob& job, OutputFile& file) : Format(job), file_(&file) {}
-  [[nodiscard]] Encoded encode(const SlicePlate& plate, int layer) const override {
-    const std::vector<Contour> outlines = contours(job().shape, plate.grid, layer);
+  [[nodiscard]] Encoded encode(const Shape& shape, const SlicePlate& plate, int layer) const override {
+    const std::vector<Contour> outlines = contours(shape, plate.grid, layer);
     std::string text = "$$LAYER/";
     append_integer(text, units((layer + 1) * plate.grid.layer_mm));
     text += "\n";
@@ -332,13 +332,14 @@ std::size_t layers_at_once() {
   return 2 * tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
 }
 
-SlicedPlate write_plate(Format& format, const SlicePlate& plate, const Context& context) {
-  SlicedPlate done;
-  int next = 0;
+/// Layers [first, last) of one shape.
+void write_layers(Format& format, const Shape& shape, const SlicePlate& plate, int first, int last, SlicedPlate& done,
+                  const Context& context) {
+  int next = first;
   tbb::parallel_pipeline(layers_at_once(),
                          tbb::make_filter<void, int>(tbb::filter_mode::serial_in_order,
                                                      [&](tbb::flow_control& control) {
-                                                       if (next < plate.grid.layers) return next++;
+                                                       if (next < last) return next++;
                                                        control.stop();
                                                        return 0;
                                                      }) &
@@ -346,7 +347,7 @@ SlicedPlate write_plate(Format& format, const SlicePlate& plate, const Context& 
                                                                              [&](int layer) {
                                                                                context.check();
                                                                                return std::make_shared<Encoded>(
-                                                                                   format.encode(plate, layer));
+                                                                                   format.encode(shape, plate, layer));
                                                                              }) &
                              tbb::make_filter<std::shared_ptr<Encoded>, void>(
                                  tbb::filter_mode::serial_in_order, [&](const std::shared_ptr<Encoded>& layer) {
@@ -354,6 +355,17 @@ SlicedPlate write_plate(Format& format, const SlicePlate& plate, const Context& 
                                    format.take(plate, std::move(*layer));
                                    context.progress(static_cast<double>(done.area_mm2.size()) / plate.grid.layers);
                                  }));
+}
+
+SlicedPlate write_plate(Format& format, const SliceJob& job, const SlicePlate& plate, const Context& context) {
+  SlicedPlate done;
+  for (int first = 0; first < plate.grid.layers;) {
+    context.check();
+    const LayerRun run = job.run_from ? job.run_from(plate, first) : LayerRun{plate.grid.layers, job.shape};
+    const int last = std::clamp(run.last, first + 1, plate.grid.layers);
+    write_layers(format, run.shape, plate, first, last, done, context);
+    first = last;
+  }
   for (const double area : done.area_mm2) done.volume_mm3 += area * plate.grid.layer_mm;
   return done;
 }
@@ -394,7 +406,7 @@ std::vector<SlicedPlate> write_slices(const fs::path& path, SliceFormat format, 
   std::vector<SlicedPlate> done;
   for (const SlicePlate& plate : job.plates) {
     const auto n = static_cast<double>(done.size()), all = static_cast<double>(job.plates.size());
-    done.push_back(write_plate(*writer, plate, context.part(n / all, (n + 1) / all, "layers")));
+    done.push_back(write_plate(*writer, job, plate, context.part(n / all, (n + 1) / all, "layers")));
   }
   writer->finish(done);
   file.commit();

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "fibrolite/blocks.h"
 #include "fibrolite/error.h"
 #include "fibrolite/vdb.h"
 #include "vdb_access.h"
@@ -112,7 +113,38 @@ double filled(const Leaf& leaf, openvdb::tree::ValueAccessor<const Tree>& access
     }
     sum += std::clamp(0.5F - d, 0.0F, 1.0F);
   }
-  return sum;
+  return rounded_for_sums(sum);
+}
+
+bool holds(const SampleRange& range, const openvdb::Coord& at) { return range.holds({at.x(), at.y(), at.z()}); }
+
+/// In voxels; of a range or all. Rounded for each leaf: the same bits on any number of threads, and in any parts.
+double filled_voxels(const Tree& tree, double voxel_mm, const SampleRange* range) {
+  const openvdb::tree::LeafManager<const Tree> leaves(tree);
+  std::vector<double> part(leaves.leafCount(), 0.0);
+  const auto inverse = static_cast<float>(1.0 / voxel_mm);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size(), 64), [&](const auto& some) {
+    openvdb::tree::ValueAccessor<const Tree> access(tree);
+    for (std::size_t i = some.begin(); i < some.end(); ++i) {
+      if (range == nullptr || holds(*range, leaves.leaf(i).origin())) part[i] = filled(leaves.leaf(i), access, inverse);
+    }
+  });
+  double voxels = 0;
+  for (const double v : part) voxels += v;
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    if (*tile >= 0) continue;
+    openvdb::CoordBBox box = tile.getBoundingBox();
+    if (range != nullptr) {
+      const auto axis = static_cast<std::size_t>(range->axis);
+      box.min()[axis] = std::max(box.min()[axis], range->low);
+      box.max()[axis] = std::min(box.max()[axis], range->high - 1);
+      if (box.empty()) continue;
+    }
+    voxels += static_cast<double>(box.volume());
+  }
+  return voxels;
 }
 
 }  // namespace
@@ -169,23 +201,18 @@ Box3d Solid::bounds_mm() const {
 
 double Solid::volume_mm3() const {
   const double h = impl_->spec.voxel_mm;
-  const Tree& tree = impl_->grid->tree();
-  const openvdb::tree::LeafManager<const Tree> leaves(tree);
-  // One number per leaf, summed in order: the same bits on any number of threads.
-  std::vector<double> part(leaves.leafCount(), 0.0);
-  const auto inverse = static_cast<float>(1.0 / h);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size(), 64), [&](const auto& range) {
-    openvdb::tree::ValueAccessor<const Tree> access(tree);
-    for (std::size_t i = range.begin(); i < range.end(); ++i) part[i] = filled(leaves.leaf(i), access, inverse);
-  });
-  double voxels = 0;
-  for (const double v : part) voxels += v;
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile < 0) voxels += static_cast<double>(tile.getVoxelCount());
-  }
-  return voxels * h * h * h;
+  return filled_voxels(impl_->grid->tree(), h, nullptr) * h * h * h;
+}
+
+double Solid::volume_vox(const SampleRange& range) const {
+  return filled_voxels(impl_->grid->tree(), impl_->spec.voxel_mm, &range);
+}
+
+std::int64_t Solid::active_voxels(const SampleRange& range) const {
+  std::int64_t count = 0;
+  for (auto leaf = impl_->grid->tree().cbeginLeaf(); leaf; ++leaf)
+    if (holds(range, leaf->origin())) count += static_cast<std::int64_t>(leaf->onVoxelCount());
+  return count;
 }
 
 float Solid::distance(Vec3d p) const {

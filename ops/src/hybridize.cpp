@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 
 #include "fibrolite/ops/assemble.h"
 #include "fibrolite/ops/measure.h"
@@ -68,18 +69,24 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   // One composed shape, made into voxels once, in one piece.
   const Grid grid{.voxel_mm = voxel};
   const double shell_mm = recipe.shell.thickness_mm;
+  const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
+  if (params.slabs) {
+    out.stream = run("pieces", 1.0, [&](const Context& c) {
+      Design design{params.infill, recipe, assembly, out.parts, std::move(fills), out.interfaces, out.joints, demand_n};
+      return stream(model.mesh, std::move(design), *params.slabs, grid, report, c);
+    });
+    return out;
+  }
   const Solid body = run("body", 0.60, [&](const Context& c) {
     ToSolidResult made = to_solid(model.mesh, {.grid = grid, .inside_band_mm = shell_mm}, c);
     report.model.repairs.insert(report.model.repairs.end(), made.repairs.begin(), made.repairs.end());
     return made.solid;
   });
-  const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
   out.body = distance_to(body);
   const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, recipe, assembly);
   const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
-  const Tied tied = run("one piece", 0.95, [&](const Context& c) {
-    return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()}, c);
-  });
+  const Tied tied =
+      run("one piece", 0.95, [&](const Context& c) { return tie(raw, whole, body, tie_params(recipe, voxel), c); });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
     return checked_and_mended(tied, body, fills, recipe, params.fix, report, c);
   });

@@ -14,17 +14,13 @@ using Values = std::array<float, PointBlock::capacity>;
 /// Share of a voxel below zero, from the distance at its sample.
 float below(float distance, float inverse_voxel) { return std::clamp(0.5F - distance * inverse_voxel, 0.0F, 1.0F); }
 
-struct Sums {
-  double part = 0, lumen = 0, infill = 0;
-  Vec3d moment{};
-  Sums& operator+=(const Sums& o) {
-    part += o.part;
-    lumen += o.lumen;
-    infill += o.infill;
-    moment = moment + o.moment;
-    return *this;
-  }
-};
+PartSums rounded(const PartSums& sums) {
+  const Vec3d m = sums.moment_mm;
+  return {rounded_for_sums(sums.part),
+          rounded_for_sums(sums.lumen),
+          rounded_for_sums(sums.infill),
+          {rounded_for_sums(m.x), rounded_for_sums(m.y), rounded_for_sums(m.z)}};
+}
 
 /// The share of each region in each sample's voxel: shares[region][sample], 1 in all. Near a border a voxel is split as
 /// the border runs through it, so that volumes do not jump when a border passes a sample.
@@ -61,26 +57,23 @@ void split(const std::vector<Shape>& regions, const PointBlock& block, const Box
   }
 }
 
-}  // namespace
-
-std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
-                                 double shell_mm, const Context& context) {
+std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& body, const Solid& solid,
+                                const std::vector<Shape>& regions, double shell_mm, const Context& context) {
   const double h = body.grid().voxel_mm;
   const auto inverse = static_cast<float>(1 / h), shell = static_cast<float>(shell_mm);
-  const auto origins = blocks(body);
   const Shape body_shape = distance_to(body), solid_shape = distance_to(solid);
   const std::size_t n = regions.size();
 
-  // Chunks of blocks are summed on their own and added in order: the same bits on any number of threads.
-  constexpr std::size_t chunk = 256;
-  std::vector<Sums> total(n);
-  std::vector<Sums> sums(std::min(origins.size(), 64 * chunk) * n);
-  for (std::size_t start = 0; start < origins.size(); start += 64 * chunk) {
+  // Each block is rounded, so that blocks add up to the same bits in any order.
+  constexpr std::size_t batch_size = 16384;
+  std::vector<PartSums> total(n);
+  std::vector<PartSums> sums(std::min(origins.size(), batch_size) * n);
+  for (std::size_t start = 0; start < origins.size(); start += batch_size) {
     context.check();
     const std::vector<Vec3i> batch(
         origins.begin() + static_cast<std::ptrdiff_t>(start),
-        origins.begin() + static_cast<std::ptrdiff_t>(std::min(start + 64 * chunk, origins.size())));
-    std::fill(sums.begin(), sums.end(), Sums{});
+        origins.begin() + static_cast<std::ptrdiff_t>(std::min(start + batch_size, origins.size())));
+    std::fill(sums.begin(), sums.end(), PartSums{});
     for_each_block(batch, h, [&](std::size_t number, const PointBlock& block) {
       Values b, s;
       body_shape.evaluate(block, b.data());
@@ -95,23 +88,48 @@ std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const st
         for (std::size_t r = 0; r < n; ++r) {
           const float share = shares[r][k];
           if (share <= 0) continue;
-          Sums& into = sums[number * n + r];
+          PartSums& into = sums[number * n + r];
           into.part += share * part;
           into.lumen += share * lumen;
           into.infill += share * infill;
-          into.moment = into.moment + static_cast<double>(share * part) * Vec3d{block.x[k], block.y[k], block.z[k]};
+          into.moment_mm =
+              into.moment_mm + static_cast<double>(share * part) * Vec3d{block.x[k], block.y[k], block.z[k]};
         }
       }
+      for (std::size_t r = 0; r < n; ++r) sums[number * n + r] = rounded(sums[number * n + r]);
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {
       for (std::size_t r = 0; r < n; ++r) total[r] += sums[i * n + r];
     }
   }
+  return total;
+}
+
+}  // namespace
+
+PartSums& PartSums::operator+=(const PartSums& other) {
+  part += other.part;
+  lumen += other.lumen;
+  infill += other.infill;
+  moment_mm = moment_mm + other.moment_mm;
+  return *this;
+}
+
+PartVolumes PartSums::volumes(double voxel_mm) const {
+  const double voxel_mm3 = voxel_mm * voxel_mm * voxel_mm;
+  return {part * voxel_mm3, lumen * voxel_mm3, infill * voxel_mm3, part > 0 ? moment_mm / part : Vec3d{}};
+}
+
+std::vector<PartSums> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions, double shell_mm,
+                              const SampleRange& range, const Context& context) {
+  return sums_over(blocks(body, range), body, solid, regions, shell_mm, context);
+}
+
+std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
+                                 double shell_mm, const Context& context) {
   std::vector<PartVolumes> result;
-  for (const Sums& t : total) {
-    result.push_back(
-        {t.part * h * h * h, t.lumen * h * h * h, t.infill * h * h * h, t.part > 0 ? t.moment / t.part : Vec3d{}});
-  }
+  for (const PartSums& sums : sums_over(blocks(body), body, solid, regions, shell_mm, context))
+    result.push_back(sums.volumes(body.grid().voxel_mm));
   return result;
 }
 

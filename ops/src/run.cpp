@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <utility>
 
 #include "fibrolite/blocks.h"
 #include "fibrolite/ops/grading.h"
@@ -90,7 +92,9 @@ Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& b
 
 double section_pixel(const Recipe& recipe) { return std::min(0.25 * recipe.mfs.wall_mm, 0.1); }
 
-double tie_mm(const Recipe& recipe, double voxel_mm) { return std::max(members(recipe.tcs).least_mm, 2 * voxel_mm); }
+TieParams tie_params(const Recipe& recipe, double voxel_mm) {
+  return {.strut_mm = std::max(members(recipe.tcs).least_mm, 2 * voxel_mm), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
+}
 
 std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                             const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
@@ -131,7 +135,7 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
                           bool fix, Report& report, const Context& context) {
   const PrintParams& limits = recipe.print;
   const double voxel = body.grid().voxel_mm, shell_mm = recipe.shell.thickness_mm;
-  const TieParams ties{.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
+  const TieParams ties = tie_params(recipe, voxel);
   const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
   Mended out{tied, {}, {}, 0};
   const bool mending = fix || drain_mm > 0;
@@ -147,6 +151,43 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
   report.print.voids_filled = out.voids_filled;
   return out;
 }
+
+namespace {
+
+/// With pores filled and specks taken away: both balls of one radius, that count no farther than that from their
+/// surface, so that the value at a point does not depend on balls elsewhere.
+struct Retouched final : Shape::Function {
+  using Values = std::array<float, PointBlock::capacity>;
+  Retouched(Shape m, Shape b, Shape p, Shape s, float r)
+      : made(std::move(m)), body(std::move(b)), pores(std::move(p)), specks(std::move(s)), radius(r) {}
+
+  void evaluate(const PointBlock& block, float* out) const override {
+    made.evaluate(block, out);
+    Values ball, b;
+    pores.evaluate(block, ball.data());
+    if (near(block, ball)) {
+      body.evaluate(block, b.data());
+      for (std::size_t k = 0; k < static_cast<std::size_t>(block.count); ++k)
+        if (ball[k] < radius) out[k] = std::min(out[k], std::max(b[k], ball[k]));
+    }
+    specks.evaluate(block, ball.data());
+    for (std::size_t k = 0; k < static_cast<std::size_t>(block.count); ++k)
+      if (ball[k] < radius) out[k] = std::max(out[k], -ball[k]);
+  }
+  [[nodiscard]] bool near(const PointBlock& block, const Values& ball) const {
+    return *std::min_element(ball.begin(), ball.begin() + block.count) < radius;
+  }
+  [[nodiscard]] Interval bound(const Box3d& box) const override {
+    const Interval m = made.bound(box), p = pores.bound(box), s = specks.bound(box);
+    return {p.lo < radius ? std::min(m.lo, p.lo) : m.lo, s.lo < radius ? std::max(m.hi, -s.lo) : m.hi};
+  }
+  [[nodiscard]] double lipschitz() const override { return made.lipschitz(); }
+
+  Shape made, body, pores, specks;
+  float radius;
+};
+
+}  // namespace
 
 Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
   const Shape b = distance_to(body), solid = distance_to(mended.tied.solid);
@@ -175,10 +216,9 @@ Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
     all.specks.insert(all.specks.end(), one.specks.begin(), one.specks.end());
     all.pores.insert(all.pores.end(), one.pores.begin(), one.pores.end());
   }
-  Shape result = made;
-  if (!all.pores.empty()) result = unite({result, intersect({b, capsules(all.pores)})});
-  if (!all.specks.empty()) result = subtract(result, capsules(all.specks));
-  return result;
+  if (all.pores.empty() && all.specks.empty()) return made;
+  return Shape(std::make_shared<const Retouched>(made, b, capsules(all.pores), capsules(all.specks),
+                                                 static_cast<float>(radius)));
 }
 
 std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made, const std::vector<Fill>& fills,

@@ -13,6 +13,7 @@
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/measure.h"
 #include "fibrolite/ops/mend.h"
+#include "fibrolite/ops/solid_stream.h"
 #include "fibrolite/ops/tie.h"
 
 namespace fibrolite {
@@ -53,8 +54,23 @@ class Run {
 [[nodiscard]] std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                                           const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
                                           const Context& context);
-/// Diameter of a tie: the thinnest member of the recipe, at least two voxels.
-[[nodiscard]] double tie_mm(const Recipe& recipe, double voxel_mm);
+/// Ties as thick as the thinnest member of the recipe, at least two voxels.
+[[nodiscard]] TieParams tie_params(const Recipe& recipe, double voxel_mm);
+
+/// All that makes a printed solid of a body.
+struct Design {
+  InfillKind infill = InfillKind::Hybrid;
+  Recipe recipe;
+  AssembleParams assembly;
+  Parts parts;
+  std::vector<Fill> fills;
+  std::vector<Interface> interfaces;
+  std::vector<Joint> joints;
+  std::vector<double> demand_n;  ///< Of each interface.
+};
+/// The first pass over a solid that is never whole (solid_stream.h).
+[[nodiscard]] SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid grid, Report& report,
+                                 const Context& context);
 
 [[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
                             const std::vector<Joint>& joints, InfillKind infill, const Recipe& recipe,
@@ -77,6 +93,8 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
                    const std::vector<double>& demand_n, const Recipe& recipe, Report& report);
 void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
+/// Of a solid that is not held: all but its samples' number and size.
+void report_solid(const Tied& tied, double body_mm3, double solid_mm3, const Material& material, Report& report);
 /// What hangs free, and what hangs on the shell by too thin a neck.
 void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
                         const Recipe& recipe, InfillKind infill, Report& report, const Context& context);

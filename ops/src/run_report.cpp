@@ -84,9 +84,14 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
 }
 
 void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report) {
+  report.solid.active_voxels = tied.solid.active_voxels();
+  report.solid.voxel_mm = body.grid().voxel_mm;
+  report_solid(tied, body.volume_mm3(), tied.solid.volume_mm3(), material, report);
+}
+
+void report_solid(const Tied& tied, double body_mm3, double solid_mm3, const Material& material, Report& report) {
   SolidReport& out = report.solid;
-  const double body_mm3 = body.volume_mm3();
-  out.volume_mm3 = tied.solid.volume_mm3();
+  out.volume_mm3 = solid_mm3;
   out.fill_ratio = body_mm3 > 0 ? out.volume_mm3 / body_mm3 : 0;
   out.mass_g = out.volume_mm3 * 1e-3 * material.density_g_cm3;
   out.pieces = static_cast<std::int64_t>(tied.left.material.size());
@@ -95,8 +100,6 @@ void report_solid(const Tied& tied, const Solid& body, const Material& material,
   out.ties = static_cast<std::int64_t>(tied.struts.size());
   out.specks_removed = tied.dropped;
   out.voids_filled = tied.filled;
-  out.active_voxels = tied.solid.active_voxels();
-  out.voxel_mm = body.grid().voxel_mm;
   report.model.volume_mm3 = body_mm3;
   if (out.pieces > 1) {
     report.warnings.push_back("the solid has " + std::to_string(out.pieces) +

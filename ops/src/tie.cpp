@@ -15,10 +15,7 @@ Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const Ti
   for (int round = 0; round < rounds && cleaned.left.material.size() > 1; ++round) {
     const auto found = gaps(cleaned.solid, params.reach_mm, context);
     if (found.empty()) break;
-    for (const Gap& gap : found) {
-      const Vec3d root = 0.5 * params.strut_mm * normalized(gap.to_mm - gap.from_mm);  // grown into both ends
-      result.struts.push_back({gap.from_mm - root, gap.to_mm + root, 0.5 * params.strut_mm});
-    }
+    for (const Gap& gap : found) result.struts.push_back(strut(gap, params.strut_mm));
     const Shape tied = unite({assembled, intersect({distance_to(body), capsules(result.struts)})});
     cleaned = clean(realize(tied, body, context), params.clean, context);
   }
@@ -27,6 +24,11 @@ Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const Ti
   result.filled = cleaned.filled;
   result.left = std::move(cleaned.left);
   return result;
+}
+
+Capsule strut(const Gap& gap, double strut_mm) {
+  const Vec3d root = 0.5 * strut_mm * normalized(gap.to_mm - gap.from_mm);
+  return {gap.from_mm - root, gap.to_mm + root, 0.5 * strut_mm};
 }
 
 }  // namespace fibrolite

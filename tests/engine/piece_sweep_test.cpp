@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,10 @@ PieceSweep::Result swept(const Solid& solid, int axis, int thickness, const Piec
   PieceSweep::Params p = params;
   p.axis = axis;
   PieceSweep sweep(grid, p);
-  for (int at = low; at < high; at += thickness) sweep.add(solid, at, std::min(at + thickness, high), anchor);
+  for (int at = high; p.falling && at > low; at -= thickness)
+    sweep.add(solid, std::max(at - thickness, low), at, anchor);
+  for (int at = low; !p.falling && at < high; at += thickness)
+    sweep.add(solid, at, std::min(at + thickness, high), anchor);
   return sweep.finish();
 }
 
@@ -67,6 +71,9 @@ TEST(PieceSweep, finds_what_the_whole_solid_has) {
       const PieceSweep::Result got = swept(solid, axis, thickness);
       expect_same(got.left.material, whole.material);
       expect_same(got.left.cavities, whole.cavities);
+      const PieceSweep::Result falling = swept(solid, axis, thickness, {.falling = true});
+      expect_same(falling.left.material, whole.material);
+      expect_same(falling.left.cavities, whole.cavities);
       EXPECT_TRUE(got.flips.blocks.empty());
     });
   }

@@ -19,4 +19,13 @@ struct SampleBox {
   friend constexpr bool operator==(const SampleBox&, const SampleBox&) = default;
 };
 
+/// Whole blocks of 8 along one axis: the samples low <= (i, j, k)[axis] < high, both multiples of 8.
+struct SampleRange {
+  int axis = 2, low = 0, high = 0;
+  [[nodiscard]] constexpr bool holds(Vec3i sample) const {
+    const int at = axis == 0 ? sample.x : axis == 1 ? sample.y : sample.z;
+    return at >= low && at < high;
+  }
+};
+
 }  // namespace fibrolite

@@ -28,13 +28,14 @@ struct Flips {
 class PieceSweep {
  public:
   struct Params {
-    int axis = 2;      ///< Along which the slabs follow each other.
-    double below = 0;  ///< Material is what reads less than this, mm; 0 or negative, within the band.
+    int axis = 2;          ///< Along which the slabs follow each other.
+    bool falling = false;  ///< From high to low.
+    double below = 0;      ///< Material is what reads less than this, mm; 0 or negative, within the band.
     CleanParams clean{.drop_below_vox = 0, .fill_below_vox = 0};  ///< Up to 512: less than a whole block.
   };
   PieceSweep(Grid grid, const Params& params);
-  /// The next slab: the blocks of 8 with low <= sample[axis] < high; both multiples of 8, the first low any, each next
-  /// one the last high. What `solid` holds beyond is not looked at. Pieces with a sample where `anchor` is negative are
+  /// The next slab: the blocks of 8 with low <= sample[axis] < high; both multiples of 8, each slab next to the one
+  /// before. What `solid` holds beyond is not looked at. Pieces with a sample where `anchor` is negative are
   /// held. Cost: as pieces(), plus the slab's last layer of samples in memory.
   void add(const Solid& solid, int low, int high, const Shape& anchor = nothing(), const Context& context = {});
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "fibrolite/context.h"
@@ -67,5 +68,8 @@ struct Gap {
 /// For each loose piece (all but the largest): the shortest found straight gap to material of another piece, through
 /// void, searched within `reach_mm`. Pieces with none are left out. Cost: O(loose voxels * reach^2) at worst.
 [[nodiscard]] std::vector<Gap> gaps(const Solid& solid, double reach_mm, const Context& context = {});
+/// The same of the piece that this sample belongs to. Cost: as pieces(), and that search.
+[[nodiscard]] std::optional<Gap> gap_from(const Solid& solid, Vec3d sample_mm, double reach_mm,
+                                          const Context& context = {});
 
 }  // namespace fibrolite

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,12 +36,20 @@ struct SlicePlate {
   std::string name;  ///< Of the folder in the file; empty: none. Only a PngZip holds several plates.
   SliceGrid grid;
 };
+/// Layers up to `last` (which is not among them) can be cut from `shape`.
+struct LayerRun {
+  int last = 0;
+  Shape shape;
+};
 struct SliceJob {
   Shape shape;
   std::vector<SlicePlate> plates;
   int planes = 1;    ///< As SliceParams.
   std::string name;  ///< Of the part; letters, digits, - and _ are kept, all else becomes _.
   Screen screen{};   ///< For Sl1.
+  /// If given, what is cut instead of `shape`, for work that is never whole in memory: called for each plate with the
+  /// first layer that is not yet written, in order.
+  std::function<LayerRun(const SlicePlate& plate, int first)> run_from{};
 };
 struct SlicedPlate {
   std::vector<double> area_mm2;  ///< Per layer.

@@ -27,6 +27,10 @@ class Solid {
   /// its Laplacian there. Error about 1 % for sticks three voxels thick, falling with the square of the thickness.
   /// Cost: O(active voxels), parallel; the same bits on any number of threads.
   [[nodiscard]] double volume_mm3() const;
+  /// The same of some of the samples, in voxels: the volumes of ranges add up to the whole's without an error, if
+  /// the solid holds the samples next to each range too.
+  [[nodiscard]] double volume_vox(const SampleRange& range) const;
+  [[nodiscard]] std::int64_t active_voxels(const SampleRange& range) const;
   /// Trilinear distance at a world point, mm; +-(band) outside the band. Cost: O(1).
   [[nodiscard]] float distance(Vec3d p) const;
 

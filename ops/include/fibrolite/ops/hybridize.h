@@ -14,6 +14,7 @@
 #include "fibrolite/ops/prepare.h"
 #include "fibrolite/ops/recipe.h"
 #include "fibrolite/ops/report.h"
+#include "fibrolite/ops/solid_stream.h"
 #include "fibrolite/solid.h"
 #include "fibrolite/solid_io.h"
 
@@ -26,6 +27,8 @@ struct HybridizeParams {
   bool fix = false;                ///< Mend what the print checks find (mend.h).
   bool steps = false;              ///< Also realize every step as a grid of its own.
   bool function = false;           ///< Also give the solid as a distance function (Hybrid::printed).
+  /// Make no solid but one that comes slab by slab (Hybrid::stream). No mending, print checks, steps nor function.
+  std::optional<SlabPlan> slabs{};
 };
 struct Hybrid {
   Solid solid;  ///< The printed solid.
@@ -40,7 +43,8 @@ struct Hybrid {
   /// If asked for: the solid as a function, sharper than its voxels: body, shell, fills, joints and ties as composed,
   /// less the specks, with the pores filled. It holds the body's distance and no grid of the solid.
   Shape printed;
-  StressField field;  ///< If recipe.verify.keep_field, of a hybrid.
+  std::optional<SolidStream> stream{};  ///< If slabs were asked for: what makes the solid, which is empty.
+  StressField field;                    ///< If recipe.verify.keep_field, of a hybrid.
 };
 /// The candidates by recipe.partition.by: limbs by shape, cores by load, or both. `load`: as the proxy stands
 /// (in_stance()). Its stages are timed into `stages`. @throws Error of partition() and find_cores().

@@ -16,10 +16,20 @@ struct PartVolumes {
   double infill_mm3 = 0;  ///< Material in the lumen (fills, joints and ties).
   Vec3d centroid_mm{};    ///< Of part_mm3.
 };
+/// The same as sums over samples, in voxels: those of ranges add up to the whole's without an error.
+struct PartSums {
+  double part = 0, lumen = 0, infill = 0;
+  Vec3d moment_mm{};
+  PartSums& operator+=(const PartSums& other);
+  [[nodiscard]] PartVolumes volumes(double voxel_mm) const;
+};
 /// One entry per region, at least one; a voxel on a border counts for both in part. `body` and `solid` share one
 /// lattice. Samples near a surface count in part. Cost: O(samples inside the body), parallel; the same bits on any
 /// number of threads.
 [[nodiscard]] std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
                                                double shell_mm, const Context& context = {});
+/// Of the samples in a range only.
+[[nodiscard]] std::vector<PartSums> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
+                                            double shell_mm, const SampleRange& range, const Context& context = {});
 
 }  // namespace fibrolite

@@ -26,5 +26,7 @@ struct Tied {
 /// rounds.
 [[nodiscard]] Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
                        const Context& context = {});
+/// What crosses a gap: grown into both its ends by half its diameter.
+[[nodiscard]] Capsule strut(const Gap& gap, double strut_mm);
 
 }  // namespace fibrolite

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The printed solid a slab at a time, for solids that do not fit into memory.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/ops/recipe.h"
+#include "fibrolite/ops/report.h"
+#include "fibrolite/shape.h"
+#include "fibrolite/solid.h"
+
+namespace fibrolite {
+
+/// How a solid is cut into slabs.
+struct SlabPlan {
+  int axis = 2;                ///< Of the world, across which they lie.
+  std::vector<int> borders{};  ///< Samples along it, multiples of 8, rising: slab i from borders[i] to borders[i + 1].
+  int margin_vox = 8;          ///< How far beyond its slab each is known; a multiple of 8.
+  double memory_bytes = 0;     ///< What the run will need at most; more than allowed if 8 samples are too many.
+};
+/// Slabs as thick as the memory allows, by how much surface and lumen there is across the axis. `margin_mm`: how far
+/// beyond a slab the solid will be looked at.
+/// Cost: O(triangles).
+[[nodiscard]] SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, int axis,
+                                  double margin_mm, double allowed_bytes);
+
+/// Made by hybridize(). Two passes: the first, before it is made, finds loose pieces, specks and micro-voids with no
+/// more than a slab in memory; the second is the caller's, who asks for each slab. The solid is the one that
+/// hybridize() makes whole, sample for sample, however it is cut.
+class SolidStream {
+ public:
+  struct Impl;
+  explicit SolidStream(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+  [[nodiscard]] const SlabPlan& plan() const;
+  [[nodiscard]] Grid grid() const;
+  [[nodiscard]] std::size_t slabs() const { return plan().borders.size() - 1; }
+  struct Slab {
+    SampleRange range;
+    Solid body, solid;  ///< With the margin.
+    Shape printed;      ///< As Hybrid::printed, good up to three voxels less than the margin beyond the slab.
+  };
+  /// Any slab; measured the first time, for which they must come in rising or in falling order. Cost: body and solid of
+  /// the slab are made anew each time.
+  [[nodiscard]] Slab slab(std::size_t number, const Context& context = {});
+  /// After each slab has been asked for: what was measured, as hybridize() reports it of a whole solid.
+  void finish(Report& report) const;
+
+ private:
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace fibrolite

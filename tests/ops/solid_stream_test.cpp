@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/ops/solid_stream.h"
+
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "fibrolite/mesh_io.h"
+#include "fibrolite/random.h"
+#include "fibrolite/vdb.h"
+#include "hybrid_runs.h"
+#include "models.h"
+
+namespace fibrolite {
+namespace {
+
+using testing::asset;
+using testing::hybridized;
+using testing::Outcome;
+using testing::sturdy;
+
+SlabPlan slabs_of(const Mesh& mesh, double voxel_mm, int axis, int thickness) {
+  const Box3d box = bounds(mesh).grown(4 * voxel_mm);
+  SlabPlan plan{.axis = axis};
+  for (int at = static_cast<int>(std::floor(box.min[axis] / voxel_mm)) & ~7;; at += thickness) {
+    plan.borders.push_back(at);
+    if (at > box.max[axis] / voxel_mm) return plan;
+  }
+}
+
+HybridizeParams params_of(InfillKind infill, double voxel_mm) {
+  HybridizeParams params;
+  params.recipe = sturdy();
+  params.infill = infill;
+  params.voxel_mm = voxel_mm;
+  params.function = true;
+  return params;
+}
+
+/// Every sample of the slab's own range.
+void expect_same_samples(const SolidStream::Slab& slab, const Solid& whole) {
+  const auto wanted = to_vdb(whole), got = to_vdb(slab.solid);
+  const auto wanted_access = wanted->getConstAccessor(), got_access = got->getConstAccessor();
+  for (const auto* grid : {&wanted, &got}) {
+    for (auto leaf = (*grid)->tree().cbeginLeaf(); leaf; ++leaf) {
+      const openvdb::Coord o = leaf->origin();
+      if (!slab.range.holds({o.x(), o.y(), o.z()})) continue;
+      for (openvdb::Index i = 0; i < 512; ++i) {
+        const openvdb::Coord at = leaf->offsetToGlobalCoord(i);
+        ASSERT_EQ(got_access.getValue(at), wanted_access.getValue(at)) << at;
+      }
+    }
+  }
+}
+
+void expect_same_function(const SolidStream::Slab& slab, const Shape& whole, const Box3d& box, double voxel_mm) {
+  Random random(slab.range.low, "points");
+  Vec3d low = box.min, high = box.max;
+  (slab.range.axis == 0 ? low.x : slab.range.axis == 1 ? low.y : low.z) = slab.range.low * voxel_mm;
+  (slab.range.axis == 0 ? high.x : slab.range.axis == 1 ? high.y : high.z) = slab.range.high * voxel_mm;
+  for (int i = 0; i < 300; ++i) {
+    const double x = random.uniform(), y = random.uniform(), z = random.uniform();
+    const Vec3d p = low + Vec3d{x * (high.x - low.x), y * (high.y - low.y), z * (high.z - low.z)};
+    ASSERT_EQ(slab.printed(p), whole(p)) << p.x << " " << p.y << " " << p.z;
+  }
+}
+
+void expect_same_report(const Report& a, const Report& b) {
+  EXPECT_EQ(a.model.volume_mm3, b.model.volume_mm3);
+  EXPECT_EQ(a.model.repairs, b.model.repairs);
+  EXPECT_EQ(a.solid.volume_mm3, b.solid.volume_mm3);
+  EXPECT_EQ(a.solid.fill_ratio, b.solid.fill_ratio);
+  EXPECT_EQ(a.solid.mass_g, b.solid.mass_g);
+  EXPECT_EQ(a.solid.pieces, b.solid.pieces);
+  EXPECT_EQ(a.solid.cavities, b.solid.cavities);
+  EXPECT_EQ(a.solid.cavity_volume_mm3, b.solid.cavity_volume_mm3);
+  EXPECT_EQ(a.solid.ties, b.solid.ties);
+  EXPECT_EQ(a.solid.specks_removed, b.solid.specks_removed);
+  EXPECT_EQ(a.solid.voids_filled, b.solid.voids_filled);
+  EXPECT_EQ(a.solid.active_voxels, b.solid.active_voxels);
+  EXPECT_EQ(a.solid.dangling, b.solid.dangling);
+  EXPECT_EQ(a.solid.unreached, b.solid.unreached);
+  ASSERT_EQ(a.parts.size(), b.parts.size());
+  for (std::size_t i = 0; i < a.parts.size(); ++i) {
+    EXPECT_EQ(a.parts[i].volume_mm3, b.parts[i].volume_mm3);
+    EXPECT_EQ(a.parts[i].lumen_mm3, b.parts[i].lumen_mm3);
+    EXPECT_EQ(a.parts[i].infill_volume_mm3, b.parts[i].infill_volume_mm3);
+    EXPECT_EQ(a.parts[i].centroid_mm, b.parts[i].centroid_mm);
+  }
+  EXPECT_EQ(a.interfaces.size(), b.interfaces.size());
+}
+
+/// Returns the report of the whole.
+Report expect_same_in_slabs(const Mesh& mesh, const HybridizeParams& params, int axis, int thickness, bool falling) {
+  SCOPED_TRACE("axis " + std::to_string(axis) + ", slabs of " + std::to_string(thickness));
+  const Outcome whole = hybridized(mesh, params);
+  HybridizeParams cut = params;
+  cut.slabs = slabs_of(mesh, *params.voxel_mm, axis, thickness);
+  Outcome streamed = hybridized(mesh, cut);
+  EXPECT_TRUE(streamed.hybrid.solid.empty());
+  SolidStream& stream = streamed.hybrid.stream.value();
+  for (std::size_t i = 0; i < stream.slabs(); ++i) {
+    const SolidStream::Slab slab = stream.slab(falling ? stream.slabs() - 1 - i : i);
+    expect_same_samples(slab, whole.hybrid.solid);
+    expect_same_function(slab, whole.hybrid.printed, bounds(mesh), *params.voxel_mm);
+  }
+  stream.finish(streamed.report);
+  expect_same_report(streamed.report, whole.report);
+  return whole.report;
+}
+
+TEST(SolidStream, slabs_of_a_hybrid_are_the_whole_sample_for_sample) {
+  const Mesh mesh = read_mesh(asset("cylinder_on_box")).mesh;
+  const Report report = expect_same_in_slabs(mesh, params_of(InfillKind::Hybrid, 0.5), 2, 40, false);
+  EXPECT_GE(report.parts.size(), 2U);
+  EXPECT_EQ(report.solid.pieces, 1);
+}
+
+TEST(SolidStream, along_any_axis_and_from_the_top) {
+  const Mesh mesh = read_mesh(asset("molar")).mesh;
+  const HybridizeParams params = params_of(InfillKind::Tcs, 0.5);
+  for (int axis = 0; axis < 3; ++axis) expect_same_in_slabs(mesh, params, axis, 24, axis == 1);
+}
+
+TEST(SolidStream, ties_what_is_loose_as_the_whole_does) {
+  // Blocks that stay filled hang on nothing in an empty shell.
+  const Mesh mesh = testing::cube(40);
+  HybridizeParams params = params_of(InfillKind::Shell, 0.5);
+  params.recipe.partition.overrides.solid = {Box3d{{6, 10, 10}, {16, 30, 30}}, Box3d{{19, 10, 10}, {26, 18, 18}}};
+  const Report report = expect_same_in_slabs(mesh, params, 0, 16, false);
+  EXPECT_GE(report.solid.ties, 2);
+  EXPECT_EQ(report.solid.pieces, 1);
+}
+
+TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {
+  const Mesh mesh = read_mesh(asset("molar")).mesh;
+  const Recipe recipe;
+  const double h = 0.1;
+  std::size_t last = 1000000;
+  for (const double bytes : {300e6, 500e6, 2000e6}) {
+    const SlabPlan plan = plan_slabs(mesh, h, recipe, InfillKind::Tcs, 2, 1.0, bytes);
+    EXPECT_LE(plan.memory_bytes, bytes);
+    EXPECT_LT(plan.borders.size(), last);
+    last = plan.borders.size();
+    EXPECT_EQ(plan.margin_vox, 16);
+    EXPECT_LT(plan.borders.front() * h, bounds(mesh).min.z - 3 * h);
+    EXPECT_GT(plan.borders.back() * h, bounds(mesh).max.z + 3 * h);
+    EXPECT_TRUE(std::is_sorted(plan.borders.begin(), plan.borders.end()));
+    for (const int border : plan.borders) EXPECT_EQ(border % 8, 0);
+  }
+  EXPECT_GT(plan_slabs(mesh, h, recipe, InfillKind::Tcs, 2, 1.0, 130e6).memory_bytes, 130e6);
+}
+
+}  // namespace
+}  // namespace fibrolite
