@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sharpen.h"
 
-#include <openvdb/tools/VolumeToMesh.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -10,7 +9,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
+
+#include "dual_surface.h"
+#include "vdb_access.h"
 
 namespace fibrolite {
 namespace {
@@ -22,35 +25,31 @@ constexpr double smooth_cosine = 0.94;
 /// Directions in which the planes say less than this, relative to the best known one, stay as they are.
 constexpr double least_eigenvalue = 0.1;
 
-struct QuadSurface {
+struct FacedSurface {
   std::vector<Vec3d> points;
   std::vector<Quad> quads;  ///< Counterclockwise from outside.
   std::vector<Vec3d> normals;
 };
 
-QuadSurface zero_level(const openvdb::FloatTree::Ptr& level_set, double voxel_mm) {
-  auto grid = openvdb::FloatGrid::create(level_set);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel_mm));
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  std::vector<openvdb::Vec3s> points;
-  std::vector<openvdb::Vec3I> triangles;  // none without adaptivity
-  std::vector<openvdb::Vec4I> quads;
-  openvdb::tools::volumeToMesh(*grid, points, triangles, quads, 0.0, 0.0);
-  QuadSurface surface;
-  surface.points.reserve(points.size());
-  for (const auto& p : points) surface.points.push_back({p.x(), p.y(), p.z()});
-  surface.quads.reserve(quads.size());
-  surface.normals.reserve(quads.size());
-  for (const auto& q : quads) {  // a level set's quads wind inward
-    surface.quads.push_back({q[3], q[2], q[1], q[0]});
+FacedSurface zero_level(const openvdb::FloatTree::Ptr& level_set, double voxel_mm) {
+  const Grid spec{.voxel_mm = voxel_mm};
+  auto grid = make_grid(spec);
+  grid->setTree(level_set);
+  const QuadSurface zero = dual_surface(make_solid(std::move(grid), spec), 2, {});
+  FacedSurface surface;
+  surface.points.reserve(zero.points.size());
+  for (const auto& p : zero.points) surface.points.push_back({p.x(), p.y(), p.z()});
+  surface.quads = zero.quads;
+  surface.normals.reserve(zero.quads.size());
+  for (const Quad& q : zero.quads) {
     const auto& p = surface.points;
-    surface.normals.push_back(normalized(cross(p[q[1]] - p[q[3]], p[q[0]] - p[q[2]])));
+    surface.normals.push_back(normalized(cross(p[q[2]] - p[q[0]], p[q[3]] - p[q[1]])));
   }
   return surface;
 }
 
 /// Vertices where the surface bends.
-std::vector<bool> sharp_vertices(const QuadSurface& surface) {
+std::vector<bool> sharp_vertices(const FacedSurface& surface) {
   std::vector<Vec3d> mean(surface.points.size());
   for (std::size_t i = 0; i < surface.quads.size(); ++i) {
     for (const std::uint32_t v : surface.quads[i]) mean[v] = mean[v] + surface.normals[i];
@@ -70,7 +69,7 @@ struct Plane {
 };
 
 /// The plane of the original triangle nearest to a quad's centre, if it is near and faces the same way.
-Plane plane_at(const QuadSurface& surface, std::size_t quad, double voxel_mm, const Mesh& original,
+Plane plane_at(const FacedSurface& surface, std::size_t quad, double voxel_mm, const Mesh& original,
                const WindingTree& tree) {
   Vec3d center{};
   for (const std::uint32_t v : surface.quads[quad]) center = center + 0.25 * surface.points[v];
@@ -104,7 +103,7 @@ Vec3d way_to_minimum(const Quadric& quadric) {
   return {way.x(), way.y(), way.z()};
 }
 
-void move_to_edges(QuadSurface& surface, double voxel_mm, const Mesh& original, const WindingTree& tree) {
+void move_to_edges(FacedSurface& surface, double voxel_mm, const Mesh& original, const WindingTree& tree) {
   const std::vector<bool> sharp = sharp_vertices(surface);
   std::vector<std::size_t> near_edge;
   for (std::size_t i = 0; i < surface.quads.size(); ++i) {
@@ -146,7 +145,7 @@ void move_to_edges(QuadSurface& surface, double voxel_mm, const Mesh& original, 
 
 Mesh sharp_zero_level(const openvdb::FloatTree::Ptr& level_set, double voxel_mm, const Mesh& original,
                       const WindingTree& tree, const Context& context) {
-  QuadSurface surface = zero_level(level_set, voxel_mm);
+  FacedSurface surface = zero_level(level_set, voxel_mm);
   context.check();
   move_to_edges(surface, voxel_mm, original, tree);
   context.check();

@@ -27,10 +27,6 @@ PartSums rounded(const PartSums& sums) {
 void split(const std::vector<Shape>& regions, const PointBlock& block, const Box3d& box, float inverse_voxel,
            std::vector<Values>& shares) {
   shares.resize(regions.size());
-  if (regions.size() == 1) {
-    shares[0].fill(1);
-    return;
-  }
   Values sum{}, least;
   least.fill(far_mm);
   std::array<std::size_t, PointBlock::capacity> owner{};
@@ -57,6 +53,60 @@ void split(const std::vector<Shape>& regions, const PointBlock& block, const Box
   }
 }
 
+/// Eight sums side by side, which the compiler can keep in one register.
+struct Lanes {
+  std::array<float, 8> of{};
+  [[nodiscard]] double total() const {
+    double sum = 0;
+    for (const float lane : of) sum += static_cast<double>(lane);
+    return sum;
+  }
+};
+
+PartSums one_part(const Values& body, const Values& solid, const PointBlock& block, float inverse, float shell) {
+  Lanes part, lumen, infill;
+  Vec3d moment{};
+  for (std::size_t x = 0; x < 8; ++x) {
+    Lanes slice;
+    for (std::size_t y = 0; y < 8; ++y) {
+      Lanes row;
+      for (std::size_t z = 0; z < 8; ++z) {
+        const std::size_t k = 64 * x + 8 * y + z;
+        const float deep = below(body[k] + shell, inverse);
+        row.of[z] = below(body[k], inverse);
+        lumen.of[z] += deep;
+        infill.of[z] += std::min(deep, below(solid[k], inverse));
+        slice.of[z] += row.of[z];
+      }
+      moment.y += row.total() * static_cast<double>(block.y[64 * x + 8 * y]);
+    }
+    for (std::size_t z = 0; z < 8; ++z) {
+      part.of[z] += slice.of[z];
+      moment.z += static_cast<double>(slice.of[z]) * static_cast<double>(block.z[z]);
+    }
+    moment.x += slice.total() * static_cast<double>(block.x[64 * x]);
+  }
+  return {part.total(), lumen.total(), infill.total(), moment};
+}
+
+void add_parts(const Values& body, const Values& solid, const std::vector<Values>& shares, const PointBlock& block,
+               float inverse, float shell, PartSums* into) {
+  for (std::size_t k = 0; k < PointBlock::capacity; ++k) {
+    const float part = below(body[k], inverse);
+    if (part <= 0) continue;
+    const float lumen = below(body[k] + shell, inverse), infill = std::min(lumen, below(solid[k], inverse));
+    for (std::size_t r = 0; r < shares.size(); ++r) {
+      const float share = shares[r][k];
+      if (share <= 0) continue;
+      into[r].part += share * part;
+      into[r].lumen += share * lumen;
+      into[r].infill += share * infill;
+      into[r].moment_mm =
+          into[r].moment_mm + static_cast<double>(share * part) * Vec3d{block.x[k], block.y[k], block.z[k]};
+    }
+  }
+}
+
 std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& body, const Solid& solid,
                                 const std::vector<Shape>& regions, double shell_mm, const Context& context) {
   const double h = body.grid().voxel_mm;
@@ -79,24 +129,15 @@ std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& 
       body_shape.evaluate(block, b.data());
       solid_shape.evaluate(block, s.data());
       const Vec3d low = h * Vec3d{1.0 * block.leaf->x, 1.0 * block.leaf->y, 1.0 * block.leaf->z};
-      thread_local std::vector<Values> shares;
-      split(regions, block, {low, low + Vec3d{7 * h, 7 * h, 7 * h}}, inverse, shares);
-      for (std::size_t k = 0; k < PointBlock::capacity; ++k) {
-        const float part = below(b[k], inverse);
-        if (part <= 0) continue;
-        const float lumen = below(b[k] + shell, inverse), infill = std::min(lumen, below(s[k], inverse));
-        for (std::size_t r = 0; r < n; ++r) {
-          const float share = shares[r][k];
-          if (share <= 0) continue;
-          PartSums& into = sums[number * n + r];
-          into.part += share * part;
-          into.lumen += share * lumen;
-          into.infill += share * infill;
-          into.moment_mm =
-              into.moment_mm + static_cast<double>(share * part) * Vec3d{block.x[k], block.y[k], block.z[k]};
-        }
+      PartSums* const into = &sums[number * n];
+      if (n == 1) {
+        into[0] = one_part(b, s, block, inverse, shell);
+      } else {
+        thread_local std::vector<Values> shares;
+        split(regions, block, {low, low + Vec3d{7 * h, 7 * h, 7 * h}}, inverse, shares);
+        add_parts(b, s, shares, block, inverse, shell, into);
       }
-      for (std::size_t r = 0; r < n; ++r) sums[number * n + r] = rounded(sums[number * n + r]);
+      for (std::size_t r = 0; r < n; ++r) into[r] = rounded(into[r]);
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {
       for (std::size_t r = 0; r < n; ++r) total[r] += sums[i * n + r];

@@ -5,8 +5,10 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <memory>
 #include <numbers>
 
+#include "dual_surface.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
 #include "mesh_checks.h"
@@ -66,6 +68,22 @@ TEST(Surface, of_noise_is_closed_and_manifold) {
   EXPECT_EQ(count.nonmanifold_edges, 0);
   EXPECT_EQ(count.nonmanifold_vertices, 0);
   EXPECT_EQ(count.degenerate_triangles, 0);
+}
+
+TEST(DualSurface, slabs_give_the_same_quads_in_the_same_order) {
+  const Shape noise(std::make_shared<const Noise>());
+  const Solid solid = realize(intersect({noise, sphere({0, 0, 0}, 3)}), box, {.voxel_mm = 0.125});
+  for (const int axis : {0, 1, 2}) {
+    const QuadSurface whole = dual_surface(solid, axis, {});
+    ASSERT_GT(whole.quads.size(), 10000U);
+    for (const int thickness : {8, 24}) {
+      DualSurface sweep(solid.grid(), axis);
+      QuadSurface parts;
+      for (int at = -40; at < 40; at += thickness) sweep.add(solid, {axis, at, at + thickness}, parts, {});
+      EXPECT_EQ(parts.points, whole.points);
+      EXPECT_EQ(parts.quads, whole.quads);
+    }
+  }
 }
 
 TEST(Surface, of_touching_planes_on_the_lattice_has_no_degenerate_triangle) {

@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dual_surface.h"
+
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "fibrolite/error.h"
+#include "vdb_access.h"
+
+namespace fibrolite {
+namespace {
+
+using Tree = openvdb::FloatTree;
+using Leaf = Tree::LeafNodeType;
+using openvdb::Coord;
+using Access = openvdb::tree::ValueAccessor<const Tree>;
+
+// ---- one cell ----
+// Corner c lies at bits 0, 1, 2 of c along x, y, z. Edge 4 a + p + 2 q runs along axis a from the corner with bits p
+// and q along the next axes. Face 2 a + s is the one at s along axis a.
+
+constexpr int edges = 12, faces = 6, no_face = faces;
+
+struct Edge {
+  unsigned from, to;
+};
+constexpr Edge edge(unsigned e) {
+  const unsigned axis = e / 4, u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const unsigned from = (e & 1U) << u | (e >> 1 & 1U) << v;
+  return {from, from | 1U << axis};
+}
+
+/// Sheets of the surface in a cell, by which of its corners are inside.
+struct Sheets {
+  std::array<std::uint8_t, edges> of{};  ///< Of each crossed edge.
+  std::uint8_t count = 0;
+};
+
+/// Its four corners in a circle.
+std::array<unsigned, 4> corners_of(unsigned face) {
+  const unsigned axis = face / 2, u = 1U << (axis + 1) % 3, v = 1U << (axis + 2) % 3, base = (face & 1U) << axis;
+  return {base, base | u, base | u | v, base | v};
+}
+
+unsigned edge_between(unsigned a, unsigned b) {
+  for (unsigned e = 0; e < edges; ++e) {
+    if ((edge(e).from == a && edge(e).to == b) || (edge(e).from == b && edge(e).to == a)) return e;
+  }
+  return edges;
+}
+
+/// Across a face the edges it crosses are linked in pairs; of four, the two next to each inside corner, or (on the
+/// joined face) the two next to each outside one.
+Sheets sheets_of(unsigned inside, unsigned joined) {
+  std::array<unsigned, edges> parent;
+  std::iota(parent.begin(), parent.end(), 0U);
+  const auto root = [&](unsigned i) {
+    while (parent[i] != i) i = parent[i];
+    return i;
+  };
+  const auto crossed = [&](unsigned e) { return (inside >> edge(e).from & 1U) != (inside >> edge(e).to & 1U); };
+  for (unsigned face = 0; face < faces; ++face) {
+    const std::array<unsigned, 4> c = corners_of(face);
+    std::array<unsigned, 4> around, found;  // around[i]: from corner i to the next
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      around[i] = edge_between(c[i], c[(i + 1) % 4]);
+      if (crossed(around[i])) found[n++] = around[i];
+    }
+    if (n == 2) parent[root(found[0])] = root(found[1]);
+    if (n != 4) continue;
+    const bool apart = face != joined;
+    const std::size_t first = ((inside >> c[0] & 1U) != 0) == apart ? 0 : 1;
+    for (const std::size_t i : {first, first + 2}) parent[root(around[(i + 3) % 4])] = root(around[i]);
+  }
+  Sheets result;
+  std::array<std::uint8_t, edges> number;
+  number.fill(edges);
+  for (unsigned e = 0; e < edges; ++e) {
+    if (!crossed(e)) continue;
+    std::uint8_t& mine = number[root(e)];
+    if (mine == edges) mine = result.count++;
+    result.of[e] = mine;
+  }
+  return result;
+}
+
+struct CrossedEdges {
+  std::array<std::uint8_t, edges> list{};
+  std::uint8_t count = 0;
+};
+
+struct Tables {
+  std::array<std::array<Sheets, faces + 1>, 256> sheets;  ///< By corners inside and joined face, if any.
+  /// The face whose four crossed edges are all of one sheet; there is at most one, and then no other has four.
+  std::array<std::uint8_t, 256> doubtful;
+  std::array<CrossedEdges, 256> crossed;
+
+  Tables() {
+    for (unsigned inside = 0; inside < 256; ++inside) {
+      CrossedEdges& mine = crossed[inside];
+      for (unsigned e = 0; e < edges; ++e) {
+        if ((inside >> edge(e).from & 1U) != (inside >> edge(e).to & 1U))
+          mine.list[mine.count++] = static_cast<std::uint8_t>(e);
+      }
+      for (unsigned face = 0; face <= faces; ++face) sheets[inside][face] = sheets_of(inside, face);
+      doubtful[inside] = no_face;
+      for (unsigned face = 0; face < faces; ++face) {
+        const std::array<unsigned, 4> c = corners_of(face);
+        const auto in = [&](std::size_t i) { return (inside >> c[i] & 1U) != 0; };
+        if (in(0) != in(2) || in(1) != in(3) || in(0) == in(1)) continue;
+        const Sheets& s = sheets[inside][no_face];
+        const std::uint8_t one = s.of[edge_between(c[0], c[1])];
+        bool same = true;
+        for (std::size_t i = 1; i < 4; ++i) same = same && s.of[edge_between(c[i], c[(i + 1) % 4])] == one;
+        if (same) doubtful[inside] = static_cast<std::uint8_t>(face);
+      }
+    }
+  }
+};
+
+const Tables& tables() {
+  static const Tables all;
+  return all;
+}
+
+// ---- one block of cells ----
+
+/// The cells whose lowest corner lies in a block.
+struct Block {
+  Coord origin;
+  std::array<std::uint16_t, 81> inside;  ///< Bit z of [9 x + y]: sample (x, y, z) of the block and the next ones.
+  std::array<std::uint16_t, Leaf::SIZE> first;  ///< Vertex of each mixed cell's first sheet, in the block.
+  std::array<std::uint16_t, Leaf::SIZE> kind;   ///< 8 bits of corners inside, then the joined face.
+  std::vector<openvdb::Vec3s> points;
+  std::vector<std::array<std::uint32_t, 4>> quads;
+  std::size_t base = 0;  ///< Of its vertices among all.
+};
+
+struct Samples {
+  std::array<float, 9 * 9 * 9> value;
+
+  void fetch(const Coord& origin, const Access& access) {
+    for (int n = 0; n < 8; ++n) {
+      const int dx = n >> 2, dy = n >> 1 & 1, dz = n & 1;
+      const Coord at = origin.offsetBy(8 * dx, 8 * dy, 8 * dz);
+      const Leaf* leaf = access.probeConstLeaf(at);
+      const float tile = leaf != nullptr ? 0 : access.getValue(at);
+      const float* from = leaf != nullptr ? leaf->buffer().data() : nullptr;
+      const int nx = dx == 0 ? 8 : 1, ny = dy == 0 ? 8 : 1, nz = dz == 0 ? 8 : 1;
+      for (int x = 0; x < nx; ++x) {
+        for (int y = 0; y < ny; ++y) {
+          float* to = value.data() + ((8 * dx + x) * 9 + 8 * dy + y) * 9 + 8 * dz;
+          if (from != nullptr) {
+            std::copy_n(from + x * 64 + y * 8, nz, to);
+          } else {
+            std::fill_n(to, nz, tile);
+          }
+        }
+      }
+    }
+  }
+};
+
+/// Which corners of any cell are inside.
+unsigned corners_inside(const Coord& cell, const Access& access) {
+  unsigned inside = 0;
+  for (unsigned c = 0; c < 8; ++c) {
+    const Coord at = cell.offsetBy(static_cast<int>(c & 1U), static_cast<int>(c >> 1 & 1U), static_cast<int>(c >> 2));
+    inside |= (access.getValue(at) < 0 ? 1U : 0U) << c;
+  }
+  return inside;
+}
+
+class Cells {
+ public:
+  Cells(Block& block, const Access& access, float voxel, std::vector<openvdb::Vec3s>& room)
+      : block_(block), access_(access), voxel_(voxel), points_(room) {}
+
+  void run() {
+    points_.clear();
+    samples_.fetch(block_.origin, access_);
+    for (std::size_t row = 0; row < 81; ++row) {
+      unsigned bits = 0;
+      for (unsigned z = 0; z < 9; ++z) bits |= (samples_.value[row * 9 + z] < 0 ? 1U : 0U) << z;
+      block_.inside[row] = static_cast<std::uint16_t>(bits);
+    }
+    for (unsigned x = 0; x < 8; ++x) {
+      for (unsigned y = 0; y < 8; ++y) {
+        const std::array<unsigned, 4> rows{block_.inside[9 * x + y], block_.inside[9 * x + 9 + y],
+                                           block_.inside[9 * x + y + 1], block_.inside[9 * x + 9 + y + 1]};
+        const unsigned any = rows[0] | rows[1] | rows[2] | rows[3], all = rows[0] & rows[1] & rows[2] & rows[3];
+        for (unsigned mixed = (any | any >> 1) & ~(all & all >> 1) & 255U; mixed != 0; mixed &= mixed - 1)
+          cell(x, y, static_cast<unsigned>(std::countr_zero(mixed)), rows);
+      }
+    }
+    block_.points = points_;
+  }
+
+ private:
+  void cell(unsigned x, unsigned y, unsigned z, const std::array<unsigned, 4>& rows) {
+    unsigned inside = 0;
+    for (unsigned r = 0; r < 4; ++r) inside |= (rows[r] >> z & 1U) << r | (rows[r] >> (z + 1) & 1U) << (r + 4);
+    const unsigned joined = joined_face(x, y, z, inside);
+    const Sheets& sheets = tables().sheets[inside][joined];
+    const std::size_t at = 64 * x + 8 * y + z;
+    block_.kind[at] = static_cast<std::uint16_t>(inside | joined << 8);
+    block_.first[at] = static_cast<std::uint16_t>(points_.size());
+
+    std::array<float, 8> v;
+    for (unsigned c = 0; c < 8; ++c) v[c] = samples_.value[((x + (c & 1U)) * 9 + y + (c >> 1 & 1U)) * 9 + z + (c >> 2)];
+    std::array<std::array<float, 4>, 4> sum{};  // of each sheet; last their number
+    const CrossedEdges& crossed = tables().crossed[inside];
+    for (std::size_t n = 0; n < crossed.count; ++n) {
+      const unsigned e = crossed.list[n];
+      const Edge ends = edge(e);
+      std::array<float, 4>& of = sum[sheets.of[e]];
+      const float a = v[ends.from], t = a / (a - v[ends.to]);
+      of[0] += static_cast<float>(ends.from & 1U);
+      of[1] += static_cast<float>(ends.from >> 1 & 1U);
+      of[2] += static_cast<float>(ends.from >> 2);
+      of[e / 4] += t;
+      of[3] += 1;
+    }
+    const openvdb::Vec3s corner(static_cast<float>(block_.origin.x() + static_cast<int>(x)),
+                                static_cast<float>(block_.origin.y() + static_cast<int>(y)),
+                                static_cast<float>(block_.origin.z() + static_cast<int>(z)));
+    for (std::size_t s = 0; s < sheets.count; ++s)
+      points_.push_back(voxel_ * (corner + openvdb::Vec3s(sum[s][0], sum[s][1], sum[s][2]) / sum[s][3]));
+  }
+
+  /// The doubtful face, if it is doubtful seen from its other side too.
+  [[nodiscard]] unsigned joined_face(unsigned x, unsigned y, unsigned z, unsigned inside) const {
+    const unsigned face = tables().doubtful[inside];
+    if (face == no_face) return no_face;
+    Coord next = block_.origin.offsetBy(static_cast<int>(x), static_cast<int>(y), static_cast<int>(z));
+    next[face / 2] += (face & 1U) != 0 ? 1 : -1;
+    return tables().doubtful[corners_inside(next, access_)] == (face ^ 1U) ? face : no_face;
+  }
+
+  Block& block_;
+  const Access& access_;
+  const float voxel_;
+  std::vector<openvdb::Vec3s>& points_;
+  Samples samples_;
+};
+
+}  // namespace
+
+struct DualSurface::Impl {
+  using Key = std::array<int, 3>;  // of an origin, the axis first
+  using Layer = std::vector<Block>;
+
+  Impl(Grid g, int along) : grid(g), axis(static_cast<std::size_t>(along)) {}
+
+  [[nodiscard]] Key key(const Coord& o) const { return {o[axis], o[(axis + 1) % 3], o[(axis + 2) % 3]}; }
+
+  /// Blocks that may have mixed cells, layer by layer: leaves, and tiles below a leaf's face of another sign.
+  [[nodiscard]] std::vector<Coord> candidates(const Tree& tree, const SampleRange& range) const {
+    const openvdb::tree::LeafManager<const Tree> leaves(tree);
+    std::vector<std::vector<Coord>> found(leaves.leafCount());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, found.size(), 64), [&](const auto& some) {
+      const Access access(tree);
+      for (std::size_t i = some.begin(); i < some.end(); ++i) {
+        const Leaf& leaf = leaves.leaf(i);
+        const Coord o = leaf.origin();
+        if (o[axis] < range.low || o[axis] > range.high) continue;
+        if (o[axis] < range.high) found[i].push_back(o);
+        for (int n = 1; n < 8; ++n) {
+          const Coord low = o.offsetBy(-8 * (n >> 2), -8 * (n >> 1 & 1), -8 * (n & 1));
+          if (low[axis] < range.low || low[axis] >= range.high || access.probeConstLeaf(low) != nullptr) continue;
+          if (other_side(leaf, n, access.getValue(low) < 0)) found[i].push_back(low);
+        }
+      }
+    });
+    std::vector<Coord> all;
+    for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
+    std::sort(all.begin(), all.end(), [&](const Coord& a, const Coord& b) { return key(a) < key(b); });
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+  }
+  /// Has a leaf, on its lower face, edge or corner towards n, a sample on the other side?
+  static bool other_side(const Leaf& leaf, int n, bool inside) {
+    const float* v = leaf.buffer().data();
+    const int nx = (n >> 2) != 0 ? 1 : 8, ny = (n >> 1 & 1) != 0 ? 1 : 8, nz = (n & 1) != 0 ? 1 : 8;
+    for (int x = 0; x < nx; ++x)
+      for (int y = 0; y < ny; ++y)
+        for (int z = 0; z < nz; ++z)
+          if ((v[64 * x + 8 * y + z] < 0) != inside) return true;
+    return false;
+  }
+
+  void add_layer(const Tree& tree, const Coord* from, const Coord* to, QuadSurface& out) {
+    const auto count = static_cast<std::size_t>(to - from);
+    Layer layer(count);
+    const auto each = [&](const auto& work) {
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 8), [&](const auto& some) {
+        for (std::size_t i = some.begin(); i < some.end(); ++i) work(i);
+      });
+    };
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 8), [&](const auto& some) {
+      const Access access(tree);
+      thread_local std::vector<openvdb::Vec3s> room;
+      for (std::size_t i = some.begin(); i < some.end(); ++i) {
+        layer[i].origin = from[i];
+        Cells(layer[i], access, static_cast<float>(grid.voxel_mm), room).run();
+      }
+    });
+    std::size_t points = out_points;
+    for (Block& block : layer) {
+      block.base = points;
+      points += block.points.size();
+    }
+    if (points >= std::numeric_limits<std::uint32_t>::max())
+      throw Error(Code::TooLarge, "the surface has more vertices than a mesh can hold", {}, "use a larger --voxel");
+    each([&](std::size_t i) { add_quads(layer, i); });
+
+    std::vector<std::size_t> quads{out.quads.size()};
+    for (const Block& block : layer) quads.push_back(quads.back() + block.quads.size());
+    const std::size_t offset = out.points.size();
+    out.points.resize(offset + (points - out_points));
+    out.quads.resize(quads.back());
+    each([&](std::size_t i) {
+      Block& block = layer[i];
+      std::copy(block.points.begin(), block.points.end(),
+                out.points.begin() + static_cast<std::ptrdiff_t>(offset + block.base - out_points));
+      std::copy(block.quads.begin(), block.quads.end(), out.quads.begin() + static_cast<std::ptrdiff_t>(quads[i]));
+      block.points = {};
+      block.quads = {};
+    });
+    out_points = points;
+    out.layer_points.push_back(out.points.size());
+    out.layer_quads.push_back(out.quads.size());
+    below = std::move(layer);
+  }
+
+  [[nodiscard]] const Block* find(const Layer& layer, const Coord& origin) const {
+    const auto at = std::lower_bound(layer.begin(), layer.end(), key(origin),
+                                     [&](const Block& b, const Key& k) { return key(b.origin) < k; });
+    return at != layer.end() && at->origin == origin ? &*at : nullptr;
+  }
+
+  void add_quads(Layer& layer, std::size_t number) const {
+    Block& block = layer[number];
+    block.quads.reserve(block.points.size() + 32);  // about one for each vertex
+    // Those on the lower sides, at bits 2, 1, 0 for x, y, z.
+    std::array<const Block*, 8> lower{&block};
+    for (int n = 1; n < 8; ++n) {
+      const Coord o = block.origin.offsetBy(-8 * (n >> 2), -8 * (n >> 1 & 1), -8 * (n & 1));
+      lower[static_cast<std::size_t>(n)] = find(o[axis] == block.origin[axis] ? layer : below, o);
+    }
+    const auto vertex = [&](int x, int y, int z, unsigned e) {
+      const auto n = static_cast<std::size_t>((x < 0 ? 4 : 0) | (y < 0 ? 2 : 0) | (z < 0 ? 1 : 0));
+      const Block& in = *lower[n];
+      const auto at = static_cast<std::size_t>(64 * (x & 7) + 8 * (y & 7) + (z & 7));
+      const unsigned kind = in.kind[at];
+      return static_cast<std::uint32_t>(in.base + in.first[at] + tables().sheets[kind & 255U][kind >> 8].of[e]);
+    };
+    const auto quad = [&](int x, int y, int z, unsigned along, bool inside) {
+      std::array<std::uint32_t, 4> q;
+      constexpr std::array<unsigned, 4> circle{0, 1, 3, 2};  // bits for a step down along the next axes
+      for (std::size_t k = 0; k < 4; ++k) {
+        std::array<int, 3> cell{x, y, z};
+        cell[(along + 1) % 3] -= static_cast<int>(circle[k] & 1U);
+        cell[(along + 2) % 3] -= static_cast<int>(circle[k] >> 1);
+        q[inside ? k : 3 - k] = vertex(cell[0], cell[1], cell[2], 4 * along + circle[k]);
+      }
+      block.quads.push_back(q);
+    };
+    for (int x = 0; x < 8; ++x) {
+      for (int y = 0; y < 8; ++y) {
+        const unsigned row = block.inside[static_cast<std::size_t>(9 * x + y)];
+        const std::array<unsigned, 3> next{block.inside[static_cast<std::size_t>(9 * x + 9 + y)],
+                                           block.inside[static_cast<std::size_t>(9 * x + y + 1)], row >> 1};
+        const std::array<unsigned, 3> crossed{(row ^ next[0]) & 255U, (row ^ next[1]) & 255U, (row ^ next[2]) & 255U};
+        for (unsigned any = crossed[0] | crossed[1] | crossed[2]; any != 0; any &= any - 1) {
+          const int z = std::countr_zero(any);
+          for (unsigned along = 0; along < 3; ++along)
+            if ((crossed[along] >> z & 1U) != 0) quad(x, y, z, along, (row >> z & 1U) != 0);
+        }
+      }
+    }
+  }
+
+  const Grid grid;
+  const std::size_t axis;
+  Layer below;  ///< The layer before, for the quads that reach into it.
+  std::size_t out_points = 0;
+};
+
+DualSurface::DualSurface(Grid grid, int axis) : impl_(std::make_unique<Impl>(grid, axis)) {}
+DualSurface::~DualSurface() = default;
+
+void DualSurface::add(const Solid& solid, const SampleRange& range, QuadSurface& out, const Context& context) {
+  const Tree& tree = solid.impl().grid->tree();
+  const std::vector<Coord> blocks = impl_->candidates(tree, range);
+  for (std::size_t i = 0; i < blocks.size();) {
+    context.check();
+    std::size_t end = i;
+    while (end < blocks.size() && blocks[end][impl_->axis] == blocks[i][impl_->axis]) ++end;
+    impl_->add_layer(tree, blocks.data() + i, blocks.data() + end, out);
+    i = end;
+    context.progress(static_cast<double>(i) / static_cast<double>(blocks.size()));
+  }
+}
+
+QuadSurface dual_surface(const Solid& solid, int axis, const Context& context) {
+  QuadSurface out;
+  openvdb::CoordBBox box;
+  solid.impl().grid->tree().evalLeafBoundingBox(box);
+  if (box.empty()) return out;
+  const auto a = static_cast<std::size_t>(axis);
+  DualSurface(solid.grid(), axis).add(solid, {axis, (box.min()[a] & ~7) - 8, (box.max()[a] | 7) + 1}, out, context);
+  return out;
+}
+
+}  // namespace fibrolite
