@@ -77,11 +77,10 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   out.body = distance_to(body);
   const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, recipe, assembly);
   const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
-  const Tied tied = run("one piece", 0.95, [&](const Context& c) {
-    return tie(raw, whole, body, {.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()}, c);
-  });
+  const TieParams ties = tie_params(recipe, params.infill, body);
+  const Tied tied = run("one piece", 0.95, [&](const Context& c) { return tie(raw, whole, body, ties, c); });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
-    return checked_and_mended(tied, body, fills, recipe, params.fix, report, c);
+    return checked_and_mended(tied, body, fills, ties, recipe, params.fix, report, c);
   });
   out.solid = mended.tied.solid;
 
@@ -91,7 +90,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
     report_joints(out.interfaces, out.joints, demand_n, recipe, report);
     report_solid(mended.tied, body, recipe.material, report);
-    report_weak_places(out.parts, fills, body, out.solid, recipe, params.infill, report, c);
+    report_loose_ends(out.parts, fills, body, out.solid, shell_mm, report, c);
   });
   if (params.function) {
     const Shape smooth =

@@ -38,8 +38,10 @@ void take(Tied& tied, const Solid& solid, const Solid& body, const TieParams& pa
   const Tied now = tie(solid, distance_to(solid), body, params, context);
   tied.solid = now.solid;
   tied.left = now.left;
+  tied.unreached = now.unreached;
   tied.dropped += now.dropped;
   tied.filled += now.filled;
+  tied.necks += now.necks;
   tied.struts.insert(tied.struts.end(), now.struts.begin(), now.struts.end());
 }
 
@@ -77,9 +79,11 @@ Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const
   for (int round = 0; round < rounds && !out.tied.left.cavities.empty(); ++round) {
     const auto holes =
         drains(out.tied.solid, {.hole_mm = params.drain_mm, .up = params.up, .reach_mm = 4 * params.shell_mm}, context);
-    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(shapes(holes)));
-    take(out.tied, realize(drilled, body, context), body, params.tie, context);
     out.drains.insert(out.drains.end(), holes.begin(), holes.end());
+    TieParams around = params.tie;
+    around.keep_out = capsules(shapes(out.drains));
+    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(shapes(holes)));
+    take(out.tied, realize(drilled, body, context), body, around, context);
   }
   return out;
 }

@@ -105,6 +105,7 @@ Json to_json(const SolidReport& solid) {
           {"voids_filled", solid.voids_filled},
           {"dangling", solid.dangling},
           {"unreached", solid.unreached},
+          {"necks_thickened", solid.necks_thickened},
           {"active_voxels", solid.active_voxels},
           {"voxel_mm", solid.voxel_mm}};
 }

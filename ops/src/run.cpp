@@ -90,7 +90,17 @@ Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& b
 
 double section_pixel(const Recipe& recipe) { return std::min(0.25 * recipe.mfs.wall_mm, 0.1); }
 
-double tie_mm(const Recipe& recipe, double voxel_mm) { return std::max(members(recipe.tcs).least_mm, 2 * voxel_mm); }
+TieParams tie_params(const Recipe& recipe, InfillKind infill, const Solid& body) {
+  const double thinnest = thinnest_mm(recipe, infill), strut = members(recipe.tcs).least_mm;
+  const double least = 2 * body.grid().voxel_mm;
+  TieParams params{.strut_mm = std::max(strut, least), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
+  if (std::isfinite(thinnest)) {
+    params.neck_mm = thinnest;
+    params.strut_mm = std::max(params.strut_mm, thinnest);
+    params.anchor = shell(distance_to(body), recipe.shell.thickness_mm);
+  }
+  return params;
+}
 
 std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                             const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
@@ -127,11 +137,10 @@ Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fi
   return assemble(body, filled, shapes, params);
 }
 
-Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills, const Recipe& recipe,
-                          bool fix, Report& report, const Context& context) {
+Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills, const TieParams& ties,
+                          const Recipe& recipe, bool fix, Report& report, const Context& context) {
   const PrintParams& limits = recipe.print;
   const double voxel = body.grid().voxel_mm, shell_mm = recipe.shell.thickness_mm;
-  const TieParams ties{.strut_mm = tie_mm(recipe, voxel), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
   const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
   Mended out{tied, {}, {}, 0};
   const bool mending = fix || drain_mm > 0;

@@ -53,8 +53,8 @@ class Run {
 [[nodiscard]] std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                                           const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
                                           const Context& context);
-/// Diameter of a tie: the thinnest member of the recipe, at least two voxels.
-[[nodiscard]] double tie_mm(const Recipe& recipe, double voxel_mm);
+/// Ties as thick as the thinnest member of the recipe, at least two voxels; nothing may hang on the shell by less.
+[[nodiscard]] TieParams tie_params(const Recipe& recipe, InfillKind infill, const Solid& body);
 
 [[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
                             const std::vector<Joint>& joints, InfillKind infill, const Recipe& recipe,
@@ -64,7 +64,8 @@ class Run {
 [[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
-                                        const Recipe& recipe, bool fix, Report& report, const Context& context);
+                                        const TieParams& ties, const Recipe& recipe, bool fix, Report& report,
+                                        const Context& context);
 /// Every step as a grid of its own (see Hybrid::steps).
 [[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
                                             const std::vector<Fill>& fills, const Mended& mended,
@@ -77,8 +78,8 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
                    const std::vector<double>& demand_n, const Recipe& recipe, Report& report);
 void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
-/// What hangs free, and what hangs on the shell by too thin a neck.
-void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
-                        const Recipe& recipe, InfillKind infill, Report& report, const Context& context);
+/// What ends in the void.
+void report_loose_ends(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
+                       double shell_mm, Report& report, const Context& context);
 
 }  // namespace fibrolite

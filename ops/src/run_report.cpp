@@ -93,6 +93,8 @@ void report_solid(const Tied& tied, const Solid& body, const Material& material,
   out.cavities = static_cast<std::int64_t>(tied.left.cavities.size());
   for (const Piece& cavity : tied.left.cavities) out.cavity_volume_mm3 += cavity.volume_mm3;
   out.ties = static_cast<std::int64_t>(tied.struts.size());
+  out.necks_thickened = tied.necks;
+  out.unreached = static_cast<std::int64_t>(tied.unreached.size());
   out.specks_removed = tied.dropped;
   out.voids_filled = tied.filled;
   out.active_voxels = tied.solid.active_voxels();
@@ -104,10 +106,9 @@ void report_solid(const Tied& tied, const Solid& body, const Material& material,
   }
 }
 
-void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
-                        const Recipe& recipe, InfillKind infill, Report& report, const Context& context) {
+void report_loose_ends(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
+                       double shell_mm, Report& report, const Context& context) {
   const Shape depth = distance_to(body);
-  const double shell_mm = recipe.shell.thickness_mm;
   for (std::size_t i = 0; i < fills.size(); ++i) {
     report.solid.dangling += fills[i].free_edges;
     if (!fills[i].sticks) continue;
@@ -115,10 +116,6 @@ void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, cons
     report.solid.dangling +=
         dangling_sticks(fills[i], part.bounds_mm(), part.region(), depth, shell_mm, solid, context);
   }
-  const double thinnest = thinnest_mm(recipe, infill);
-  if (!std::isfinite(thinnest)) return;
-  report.solid.unreached =
-      static_cast<std::int64_t>(unreached(solid, shell(depth, shell_mm), thinnest, context).size());
 }
 
 }  // namespace fibrolite

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fibrolite/ops/tie.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "fibrolite/reach.h"
 #include "fibrolite/realize.h"
 
 namespace fibrolite {
@@ -12,15 +14,34 @@ Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const Ti
   constexpr int rounds = 3;  // a strut may end on another loose piece, which the next round ties
   Tied result;
   CleanResult cleaned = clean(solid, params.clean, context);
+  const auto add = [&](const Gap& gap) {
+    const Vec3d along = gap.to_mm - gap.from_mm;
+    const Vec3d root = 0.5 * params.strut_mm / std::max(norm(along), 1e-9) * along;  // grown into both ends
+    result.struts.push_back({gap.from_mm - root, gap.to_mm + root, 0.5 * params.strut_mm});
+  };
+  const auto make = [&] {
+    const Shape struts = subtract(intersect({distance_to(body), capsules(result.struts)}), params.keep_out);
+    cleaned = clean(realize(unite({assembled, struts}), body, context), params.clean, context);
+  };
   for (int round = 0; round < rounds && cleaned.left.material.size() > 1; ++round) {
     const auto found = gaps(cleaned.solid, params.reach_mm, context);
     if (found.empty()) break;
-    for (const Gap& gap : found) {
-      const Vec3d root = 0.5 * params.strut_mm * normalized(gap.to_mm - gap.from_mm);  // grown into both ends
-      result.struts.push_back({gap.from_mm - root, gap.to_mm + root, 0.5 * params.strut_mm});
+    for (const Gap& gap : found) add(gap);
+    make();
+  }
+  for (int round = 0; params.neck_mm > 0; ++round) {
+    const bool last = round == rounds;
+    const auto found =
+        unreached(cleaned.solid, params.anchor, {params.neck_mm, last ? 0 : params.reach_mm, params.keep_out}, context);
+    const std::size_t before = result.struts.size();
+    for (const Unreached& one : found)
+      if (one.way) add(*one.way);
+    if (result.struts.size() == before) {
+      for (const Unreached& one : found) result.unreached.push_back(one.piece);
+      break;
     }
-    const Shape tied = unite({assembled, intersect({distance_to(body), capsules(result.struts)})});
-    cleaned = clean(realize(tied, body, context), params.clean, context);
+    result.necks += static_cast<std::int64_t>(result.struts.size() - before);
+    make();
   }
   result.solid = std::move(cleaned.solid);
   result.dropped = cleaned.dropped;

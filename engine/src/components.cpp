@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "components.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "fibrolite/error.h"
+
+namespace fibrolite {
+namespace {
+
+using Tree = Components::Tree;
+using Leaf = Components::Leaf;
+
+constexpr std::array<openvdb::Index, 3> stride{64, 8, 1};  // of x, y, z in a leaf's buffer
+
+LeafLabels label_leaf(const float* value, float below) {
+  LeafLabels result;
+  constexpr auto unset = std::numeric_limits<std::uint16_t>::max();
+  result.label.fill(unset);
+  std::array<std::uint16_t, Leaf::SIZE> stack;
+  for (std::uint16_t seed = 0; seed < Leaf::SIZE; ++seed) {
+    if (result.label[seed] != unset) continue;
+    const auto id = static_cast<std::uint16_t>(result.voxels.size());
+    const bool inside = value[seed] < below;
+    std::size_t top = 0;
+    std::uint16_t count = 0;
+    stack[top++] = seed;
+    result.label[seed] = id;
+    while (top > 0) {
+      const unsigned v = stack[--top];
+      ++count;
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        const unsigned step = stride[axis], at = (v / step) & 7U;
+        if (at > 0 && result.label[v - step] == unset && (value[v - step] < below) == inside) {
+          result.label[v - step] = id;
+          stack[top++] = static_cast<std::uint16_t>(v - step);
+        }
+        if (at < 7 && result.label[v + step] == unset && (value[v + step] < below) == inside) {
+          result.label[v + step] = id;
+          stack[top++] = static_cast<std::uint16_t>(v + step);
+        }
+      }
+    }
+    result.voxels.push_back(count);
+    result.first.push_back(seed);
+  }
+  return result;
+}
+
+}  // namespace
+
+Components::Components(const Solid& solid, const Context& context, float below) : solid_(solid), below_(below) {
+  const Tree& tree = solid.impl().grid->tree();
+  openvdb::CoordBBox box;
+  tree.evalLeafBoundingBox(box);
+  openvdb::CoordBBox tiles;
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    if (*tile < 0) tiles.expand(tile.getBoundingBox());
+  }
+  box.expand(tiles);
+  if (box.empty()) return;
+  low_ = openvdb::Coord((box.min().x() >> 3) - 1, (box.min().y() >> 3) - 1, (box.min().z() >> 3) - 1);
+  n_ = openvdb::Coord((box.max().x() >> 3) + 2, (box.max().y() >> 3) + 2, (box.max().z() >> 3) + 2) - low_;
+  find_blocks(tree);
+  context.check();
+  label(context);
+  join();
+}
+
+std::vector<Components::Component> Components::list() const {
+  std::vector<Component> result;
+  std::vector<std::int64_t> slot(parent_.size(), -1);
+  for (std::size_t b = 0; b < block_.size(); ++b) {
+    const Id count = offset_[b + 1] - offset_[b];
+    for (Id k = 0; k < count; ++k) {
+      const Id root = find(offset_[b] + k);
+      const std::int64_t voxels = block_[b] >= 0 ? leaves_[static_cast<std::size_t>(block_[b])].voxels[k] : Leaf::SIZE;
+      if (slot[root] < 0) {
+        slot[root] = static_cast<std::int64_t>(result.size());
+        const unsigned first = block_[b] >= 0 ? leaves_[static_cast<std::size_t>(block_[b])].first[k] : 0U;
+        const openvdb::Coord at =
+            origin(b) + openvdb::Coord(static_cast<int>(first >> 6), static_cast<int>((first >> 3) & 7U),
+                                       static_cast<int>(first & 7U));
+        result.push_back({root, inside(at), 0, at});
+      }
+      result[static_cast<std::size_t>(slot[root])].voxels += voxels;
+    }
+  }
+  return result;
+}
+
+Components::Id Components::at(const openvdb::Coord& ijk) const {
+  const openvdb::Coord b = openvdb::Coord(ijk.x() >> 3, ijk.y() >> 3, ijk.z() >> 3) - low_;
+  if (b.x() < 0 || b.y() < 0 || b.z() < 0 || b.x() >= n_.x() || b.y() >= n_.y() || b.z() >= n_.z()) return find(0);
+  const std::size_t i = index(b);
+  if (block_[i] < 0) return find(offset_[i]);
+  return find(offset_[i] + leaves_[static_cast<std::size_t>(block_[i])].label[Leaf::coordToOffset(ijk)]);
+}
+
+std::size_t Components::index(const openvdb::Coord& b) const {
+  return (static_cast<std::size_t>(b.x()) * static_cast<std::size_t>(n_.y()) + static_cast<std::size_t>(b.y())) *
+             static_cast<std::size_t>(n_.z()) +
+         static_cast<std::size_t>(b.z());
+}
+openvdb::Coord Components::origin(std::size_t b) const {
+  const auto z = static_cast<int>(b % static_cast<std::size_t>(n_.z()));
+  const std::size_t xy = b / static_cast<std::size_t>(n_.z());
+  const auto y = static_cast<int>(xy % static_cast<std::size_t>(n_.y()));
+  const auto x = static_cast<int>(xy / static_cast<std::size_t>(n_.y()));
+  return openvdb::Coord((x + low_.x()) * 8, (y + low_.y()) * 8, (z + low_.z()) * 8);
+}
+
+void Components::find_blocks(const Tree& tree) {
+  const double count = 1.0 * n_.x() * n_.y() * n_.z();
+  if (count > 2e9) {
+    throw Error(Code::TooLarge, "the solid is too large to count its pieces", {}, "use a larger --voxel");
+  }
+  block_.assign(static_cast<std::size_t>(count), void_tile);
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const openvdb::Coord o = leaf->origin();
+    block_[index(openvdb::Coord(o.x() >> 3, o.y() >> 3, o.z() >> 3) - low_)] =
+        static_cast<std::int32_t>(tree_leaves_.size());
+    tree_leaves_.push_back(leaf.getLeaf());
+  }
+  auto tile = tree.cbeginValueAll();
+  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    if (*tile >= 0) continue;
+    const openvdb::CoordBBox box = tile.getBoundingBox();
+    for (int x = box.min().x() >> 3; x <= box.max().x() >> 3; ++x) {
+      for (int y = box.min().y() >> 3; y <= box.max().y() >> 3; ++y) {
+        for (int z = box.min().z() >> 3; z <= box.max().z() >> 3; ++z) {
+          block_[index(openvdb::Coord(x, y, z) - low_)] = full_tile;
+        }
+      }
+    }
+  }
+}
+
+void Components::label(const Context& context) {
+  leaves_.resize(tree_leaves_.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
+    if (context.cancelled()) return;
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      leaves_[i] = label_leaf(tree_leaves_[i]->buffer().data(), below_);
+  });
+  context.check();
+  offset_.resize(block_.size() + 1);
+  Id next = 0;
+  for (std::size_t b = 0; b < block_.size(); ++b) {
+    offset_[b] = next;
+    next += block_[b] >= 0 ? static_cast<Id>(leaves_[static_cast<std::size_t>(block_[b])].voxels.size()) : 1U;
+  }
+  offset_.back() = next;
+  parent_.resize(next);
+  std::iota(parent_.begin(), parent_.end(), Id{0});
+}
+
+void Components::unite(Id a, Id b) {
+  a = root_of(a);
+  b = root_of(b);
+  if (a != b) parent_[std::max(a, b)] = std::min(a, b);
+}
+Components::Id Components::root_of(Id i) {
+  while (parent_[i] != i) {
+    parent_[i] = parent_[parent_[i]];
+    i = parent_[i];
+  }
+  return i;
+}
+
+void Components::join() {
+  for (int x = 0; x < n_.x(); ++x) {
+    for (int y = 0; y < n_.y(); ++y) {
+      for (int z = 0; z < n_.z(); ++z) {
+        const std::size_t b = index(openvdb::Coord(x, y, z));
+        if (x + 1 < n_.x()) join_faces(b, index(openvdb::Coord(x + 1, y, z)), 0);
+        if (y + 1 < n_.y()) join_faces(b, index(openvdb::Coord(x, y + 1, z)), 1);
+        if (z + 1 < n_.z()) join_faces(b, index(openvdb::Coord(x, y, z + 1)), 2);
+      }
+    }
+  }
+}
+
+void Components::join_faces(std::size_t a, std::size_t b, unsigned axis) {
+  if (block_[a] < 0 && block_[b] < 0) {
+    if (block_[a] == block_[b]) unite(offset_[a], offset_[b]);
+    return;
+  }
+  const float* va = block_[a] >= 0 ? tree_leaves_[static_cast<std::size_t>(block_[a])]->buffer().data() : nullptr;
+  const float* vb = block_[b] >= 0 ? tree_leaves_[static_cast<std::size_t>(block_[b])]->buffer().data() : nullptr;
+  const unsigned s = stride[axis], u = stride[(axis + 1) % 3], v = stride[(axis + 2) % 3];
+  Id last_a = 0, last_b = 0;
+  bool any = false;
+  for (unsigned i = 0; i < 8; ++i) {
+    for (unsigned j = 0; j < 8; ++j) {
+      const unsigned pa = 7 * s + i * u + j * v, pb = i * u + j * v;
+      const bool ia = va != nullptr ? va[pa] < below_ : block_[a] == full_tile;
+      const bool ib = vb != nullptr ? vb[pb] < below_ : block_[b] == full_tile;
+      if (ia != ib) continue;
+      const Id la = offset_[a] + (va != nullptr ? leaves_[static_cast<std::size_t>(block_[a])].label[pa] : 0U);
+      const Id lb = offset_[b] + (vb != nullptr ? leaves_[static_cast<std::size_t>(block_[b])].label[pb] : 0U);
+      if (any && la == last_a && lb == last_b) continue;  // neighbours on a face mostly repeat
+      unite(la, lb);
+      last_a = la;
+      last_b = lb;
+      any = true;
+    }
+  }
+}
+
+Vec3d world_mm(const openvdb::Coord& c, double voxel_mm) {
+  return voxel_mm * Vec3d{1.0 * c.x(), 1.0 * c.y(), 1.0 * c.z()};
+}
+
+Pieces summarize(const std::vector<Components::Component>& list, double voxel_mm) {
+  Pieces result;
+  for (std::size_t i = 1; i < list.size(); ++i) {  // 0 is the exterior
+    auto& into = list[i].inside ? result.material : result.cavities;
+    into.push_back({list[i].voxels, static_cast<double>(list[i].voxels) * voxel_mm * voxel_mm * voxel_mm,
+                    world_mm(list[i].first, voxel_mm)});
+  }
+  const auto larger = [](const Piece& a, const Piece& b) { return a.voxels > b.voxels; };
+  std::stable_sort(result.material.begin(), result.material.end(), larger);
+  std::stable_sort(result.cavities.begin(), result.cavities.end(), larger);
+  return result;
+}
+
+}  // namespace fibrolite

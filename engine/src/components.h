@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Connected components: label each 8x8x8 block on its own, in parallel, then join labels across block faces.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "fibrolite/context.h"
+#include "fibrolite/pieces.h"
+#include "fibrolite/solid.h"
+#include "vdb_access.h"
+
+namespace fibrolite {
+
+/// One leaf's labels, dense from 0 in scan order.
+struct LeafLabels {
+  std::array<std::uint16_t, openvdb::FloatTree::LeafNodeType::SIZE> label;
+  std::vector<std::uint16_t> voxels;  // per label
+  std::vector<std::uint16_t> first;   // per label: its first voxel
+};
+
+/// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what reads less
+/// than `below`, 0 or a depth within the band.
+class Components {
+ public:
+  using Tree = openvdb::FloatTree;
+  using Leaf = Tree::LeafNodeType;
+  using Id = std::uint32_t;
+
+  Components(const Solid& solid, const Context& context, float below = 0);
+
+  [[nodiscard]] bool empty() const { return offset_.empty(); }
+
+  struct Component {
+    Id id;
+    bool inside;
+    std::int64_t voxels;
+    openvdb::Coord first;
+  };
+  /// Joined components in scan order of their first voxel. The exterior is the first of all.
+  [[nodiscard]] std::vector<Component> list() const;
+
+  /// Root id of a sample; samples outside the box belong to the exterior.
+  [[nodiscard]] Id at(const openvdb::Coord& ijk) const;
+  [[nodiscard]] bool inside(const openvdb::Coord& ijk) const {
+    return solid_.impl().grid->tree().getValue(ijk) < below_;
+  }
+
+  /// Calls visit(origin, leaf labels or null for a tile, global id of label 0) for each block, in scan order.
+  template <class Visit>
+  void each_block(const Visit& visit) const {
+    for (std::size_t b = 0; b < block_.size(); ++b) {
+      visit(origin(b), block_[b] >= 0 ? &leaves_[static_cast<std::size_t>(block_[b])] : nullptr, offset_[b]);
+    }
+  }
+  [[nodiscard]] Id find(Id i) const {
+    while (parent_[i] != i) i = parent_[i];
+    return i;
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(const openvdb::Coord& b) const;
+  [[nodiscard]] openvdb::Coord origin(std::size_t b) const;
+
+  static constexpr std::int32_t void_tile = -1, full_tile = -2;
+
+  void find_blocks(const Tree& tree);
+  void label(const Context& context);
+  /// The smaller id becomes the root, so the result does not depend on the order of joining.
+  void unite(Id a, Id b);
+  Id root_of(Id i);
+  void join();
+  /// `b` lies after `a` along `axis`.
+  void join_faces(std::size_t a, std::size_t b, unsigned axis);
+
+  Solid solid_;
+  float below_;
+  openvdb::Coord low_, n_;
+  std::vector<std::int32_t> block_;  // leaf number or a tile kind
+  std::vector<const Leaf*> tree_leaves_;
+  std::vector<LeafLabels> leaves_;
+  std::vector<Id> offset_;  // first global id of each block
+  std::vector<Id> parent_;
+};
+
+[[nodiscard]] Vec3d world_mm(const openvdb::Coord& c, double voxel_mm);
+/// Material and cavities; the first of the list is the exterior and in neither.
+[[nodiscard]] Pieces summarize(const std::vector<Components::Component>& list, double voxel_mm);
+
+}  // namespace fibrolite
