@@ -115,6 +115,8 @@ CleanResult clean(const Solid& solid, const CleanParams& params, const Context& 
     }
   });
   result.solid = make_solid(grid, solid.grid());
+  // A void that was filled may have been all that kept two pieces apart.
+  if (result.filled > 0 && result.left.material.size() > 1) result.left = pieces(result.solid, context);
   return result;
 }
 

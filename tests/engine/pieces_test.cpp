@@ -67,6 +67,16 @@ TEST(Clean, drops_specks_and_fills_pores_but_keeps_the_main_piece) {
   EXPECT_EQ(again.cavities.size(), 1U);
 }
 
+TEST(Clean, pieces_that_a_filled_void_kept_apart_are_counted_as_one) {
+  const Solid solid = make(unite({subtract(sphere({0, 0, 0}, 5), sphere({0, 0, 0}, 1.1)), sphere({0, 0, 0}, 0.7)}));
+  ASSERT_EQ(pieces(solid).material.size(), 2U);
+  const CleanResult result = clean(solid, {.fill_below_vox = 1000});
+  EXPECT_EQ(result.filled, 1);
+  EXPECT_EQ(pieces(result.solid).material.size(), 1U);
+  EXPECT_EQ(result.left.material.size(), 1U);
+  EXPECT_EQ(result.left.cavities.size(), 0U);
+}
+
 TEST(Gaps, finds_the_shortest_way_to_the_neighbour) {
   const Solid solid = make(unite({sphere({-3, 0, 0}, 4), sphere({6, 0, 0}, 2)}));
   const auto found = gaps(solid, 5);
