@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fibrolite/ops/assemble.h"
+#include "fibrolite/ops/dangling.h"
 #include "fibrolite/ops/fill.h"
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/measure.h"
@@ -53,6 +54,8 @@ class Run {
 [[nodiscard]] std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                                           const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
                                           const Context& context);
+/// Of the fills that are made of sticks.
+[[nodiscard]] std::vector<Sticks> sticks_of(const Parts& parts, const std::vector<Fill>& fills);
 /// Ties as thick as the thinnest member of the recipe, at least two voxels; nothing may hang on the shell by less.
 [[nodiscard]] TieParams tie_params(const Recipe& recipe, InfillKind infill, const Solid& body);
 
@@ -64,8 +67,8 @@ class Run {
 [[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
-                                        const TieParams& ties, const Recipe& recipe, bool fix, Report& report,
-                                        const Context& context);
+                                        const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe,
+                                        bool fix, Report& report, const Context& context);
 /// Every step as a grid of its own (see Hybrid::steps).
 [[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
                                             const std::vector<Fill>& fills, const Mended& mended,
@@ -77,9 +80,7 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 /// `demand_n`: one per interface.
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
                    const std::vector<double>& demand_n, const Recipe& recipe, Report& report);
-void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
-/// What ends in the void.
-void report_loose_ends(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
-                       double shell_mm, Report& report, const Context& context);
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,
+                  Report& report);
 
 }  // namespace fibrolite

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fibrolite/ops/dangling.h"
 #include "fibrolite/pieces.h"
-#include "fibrolite/realize.h"
 #include "run.h"
 
 namespace fibrolite {
@@ -83,7 +81,8 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
   }
 }
 
-void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report) {
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,
+                  Report& report) {
   SolidReport& out = report.solid;
   const double body_mm3 = body.volume_mm3();
   out.volume_mm3 = tied.solid.volume_mm3();
@@ -94,6 +93,10 @@ void report_solid(const Tied& tied, const Solid& body, const Material& material,
   for (const Piece& cavity : tied.left.cavities) out.cavity_volume_mm3 += cavity.volume_mm3;
   out.ties = static_cast<std::int64_t>(tied.struts.size());
   out.necks_thickened = tied.necks;
+  out.tips_tied = tied.tips_tied;
+  out.tips_removed = tied.tips_removed;
+  out.dangling = tied.dangling;
+  for (const Fill& fill : fills) out.dangling += fill.free_edges;
   out.unreached = static_cast<std::int64_t>(tied.unreached.size());
   out.specks_removed = tied.dropped;
   out.voids_filled = tied.filled;
@@ -103,18 +106,6 @@ void report_solid(const Tied& tied, const Solid& body, const Material& material,
   if (out.pieces > 1) {
     report.warnings.push_back("the solid has " + std::to_string(out.pieces) +
                               " pieces: the model itself has pieces too far apart to tie");
-  }
-}
-
-void report_loose_ends(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
-                       double shell_mm, Report& report, const Context& context) {
-  const Shape depth = distance_to(body);
-  for (std::size_t i = 0; i < fills.size(); ++i) {
-    report.solid.dangling += fills[i].free_edges;
-    if (!fills[i].sticks) continue;
-    const Part& part = parts.parts[i];
-    report.solid.dangling +=
-        dangling_sticks(fills[i], part.bounds_mm(), part.region(), depth, shell_mm, solid, context);
   }
 }
 

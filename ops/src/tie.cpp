@@ -50,4 +50,18 @@ Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const Ti
   return result;
 }
 
+Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
+               const Context& context) {
+  Tied now = tie(solid, distance_to(solid), body, params, context);
+  now.dropped += before.dropped;
+  now.filled += before.filled;
+  now.necks += before.necks;
+  now.tips_tied = before.tips_tied;
+  now.tips_removed = before.tips_removed;
+  now.dangling = before.dangling;
+  now.struts.insert(now.struts.begin(), before.struts.begin(), before.struts.end());
+  now.removed = before.removed;
+  return now;
+}
+
 }  // namespace fibrolite

@@ -23,8 +23,11 @@ struct TieParams {
 struct Tied {
   Solid solid;
   std::vector<Capsule> struts;
+  std::vector<Capsule> removed{};  ///< Taken off the whole before the struts were added (trim.h).
   std::int64_t dropped = 0, filled = 0;
-  std::int64_t necks = 0;  ///< Of the struts, those along necks that were too thin.
+  std::int64_t necks = 0;                        ///< Of the struts, those along necks that were too thin.
+  std::int64_t tips_tied = 0, tips_removed = 0;  ///< Stick ends in the void (trim.h).
+  std::int64_t dangling = 0;                     ///< Those that are left.
   Pieces left;  ///< left.material.size() == 1 unless the model itself has pieces farther apart than the reach.
   std::vector<Piece> unreached{};  ///< Still on too thin a neck: none, unless the model itself or keep_out forbids it.
 };
@@ -33,5 +36,9 @@ struct Tied {
 /// something.
 [[nodiscard]] Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
                        const Context& context = {});
+
+/// `before`, changed to `solid` and made one piece again; what was done adds up.
+[[nodiscard]] Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
+                             const Context& context = {});
 
 }  // namespace fibrolite
