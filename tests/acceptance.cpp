@@ -301,10 +301,15 @@ void turned_models(Table& table) {
 
 /// Each model turned at random in its file, its load turned with it.
 void rotations(Table& table) {
-  std::uint64_t id = 0;
+  std::vector<fs::path> files;
   for (const char* file : {"horse.ply", "armadillo.obj", "hand.obj", "spot.obj", "rocker-arm.obj", "fertility.off",
-                           "monkey.obj", "bunny-open.obj"}) {
-    const Mesh mesh = prepare(read_mesh(table.models / file), {.size_mm = 100, .unit_mm = {}}).mesh;
+                           "monkey.obj", "bunny-open.obj"})
+    files.push_back(table.models / file);
+  for (const char* name : {"molar", "quadruped", "torus", "y", "bent_tube", "figure", "bracket", "cylinder_on_box"})
+    files.push_back(asset(name));
+  std::uint64_t id = 0;
+  for (const fs::path& file : files) {
+    const Mesh mesh = prepare(read_mesh(file), {.size_mm = 100, .unit_mm = {}}).mesh;
     for (int turn = 0; turn < 3; ++turn) {
       Random random(1, "rotations", id++);
       const auto unit = [&] { return 2 * random.uniform() - 1; };
@@ -314,21 +319,22 @@ void rotations(Table& table) {
       frame = {{}, x, cross(frame.z, x), frame.z};
       Mesh turned_mesh = mesh;
       for (Vec3f& v : turned_mesh.vertices) v = to_float(frame.to_world(to_double(v)));
-      const fs::path turned_file = table.work / "rotated.ply";
+      const std::string name = file.stem().string() + "-turned-" + std::to_string(turn);
+      const fs::path turned_file = table.work / (name + ".ply");
       write_mesh(turned_file, turned_mesh);
       const auto listed = [](Vec3d v) { return json::array({v.x, v.y, v.z}); };
-      const auto load_case = [&](const char* name, Vec3d force) {
-        return json{{"name", name},
+      const auto load_case = [&](const char* load_name, Vec3d force) {
+        return json{{"name", load_name},
                     {"supports", {{{"where", {{"lowest", {{"share", 0.05}, {"along", listed(frame.z)}}}}}}}},
                     {"forces",
                      {{{"force_n", 1000}, {"direction", listed(force)}, {"where", {{"seen_from", listed(frame.z)}}}}}}};
       };
       const json loads = {load_case("from above", -frame.z), load_case("at 45 degrees", -frame.z - frame.x)};
-      const std::string name = fs::path(file).stem().string() + "-turned-" + std::to_string(turn);
       const json report = table.generate(name, turned_file, {"--set", std::string("loads=").append(loads.dump())});
       if (report.is_null()) continue;
       check_printable(table, name, report);
       check_joined(table, name, report);
+      fs::remove(table.work / (name + ".stl"));  // a hundred megabytes each
     }
   }
 }

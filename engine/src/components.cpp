@@ -219,4 +219,21 @@ void Components::join_faces(std::size_t a, std::size_t b, unsigned axis) {
   }
 }
 
+Vec3d world_mm(const openvdb::Coord& c, double voxel_mm) {
+  return voxel_mm * Vec3d{1.0 * c.x(), 1.0 * c.y(), 1.0 * c.z()};
+}
+
+Pieces summarize(const std::vector<Components::Component>& list, double voxel_mm) {
+  Pieces result;
+  for (std::size_t i = 1; i < list.size(); ++i) {  // 0 is the exterior
+    auto& into = list[i].inside ? result.material : result.cavities;
+    into.push_back({list[i].voxels, static_cast<double>(list[i].voxels) * voxel_mm * voxel_mm * voxel_mm,
+                    world_mm(list[i].first, voxel_mm)});
+  }
+  const auto larger = [](const Piece& a, const Piece& b) { return a.voxels > b.voxels; };
+  std::stable_sort(result.material.begin(), result.material.end(), larger);
+  std::stable_sort(result.cavities.begin(), result.cavities.end(), larger);
+  return result;
+}
+
 }  // namespace fibrolite

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fibrolite/context.h"
+#include "fibrolite/pieces.h"
 #include "fibrolite/solid.h"
 #include "vdb_access.h"
 
@@ -88,5 +89,9 @@ class Components {
   std::vector<Id> offset_;  // first global id of each block
   std::vector<Id> parent_;
 };
+
+[[nodiscard]] Vec3d world_mm(const openvdb::Coord& c, double voxel_mm);
+/// Material and cavities; the first of the list is the exterior and in neither.
+[[nodiscard]] Pieces summarize(const std::vector<Components::Component>& list, double voxel_mm);
 
 }  // namespace fibrolite

@@ -237,7 +237,7 @@ struct PieceSweep::Impl {
     for (const Kept& kept : material) {
       result.left.material.push_back(kept.piece);
       result.boxes.push_back(kept.box);
-      if (!kept.held) result.loose.push_back(kept.piece);
+      result.held.push_back(kept.held);
     }
     for (const Kept& kept : cavities) result.left.cavities.push_back(kept.piece);
     merge(result.flips.blocks);

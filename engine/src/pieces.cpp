@@ -4,37 +4,20 @@
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <deque>
 #include <iterator>
 #include <optional>
-#include <queue>
 #include <utility>
 
 #include "components.h"
+#include "nearest_way.h"
 
 namespace fibrolite {
 namespace {
 
-using Tree = openvdb::FloatTree;
-using Leaf = Tree::LeafNodeType;
+using Tree = Components::Tree;
+using Leaf = Components::Leaf;
 using Id = Components::Id;
-
-Vec3d world(const openvdb::Coord& c, double voxel) { return voxel * Vec3d{1.0 * c.x(), 1.0 * c.y(), 1.0 * c.z()}; }
-
-Pieces summarize(const std::vector<Components::Component>& list, double voxel) {
-  Pieces result;
-  for (std::size_t i = 1; i < list.size(); ++i) {  // 0 is the exterior
-    auto& into = list[i].inside ? result.material : result.cavities;
-    into.push_back(
-        {list[i].voxels, static_cast<double>(list[i].voxels) * voxel * voxel * voxel, world(list[i].first, voxel)});
-  }
-  const auto larger = [](const Piece& a, const Piece& b) { return a.voxels > b.voxels; };
-  std::stable_sort(result.material.begin(), result.material.end(), larger);
-  std::stable_sort(result.cavities.begin(), result.cavities.end(), larger);
-  return result;
-}
 
 /// The largest material component, the one that is never loose.
 Id main_piece(const std::vector<Components::Component>& list) {
@@ -49,63 +32,32 @@ Id main_piece(const std::vector<Components::Component>& list) {
   return best;
 }
 
-/// From one piece, given by its id and a sample, to the nearest other.
+/// From one piece, given by its id and a sample, through void to the nearest other.
 std::optional<Gap> gap_of(const Components& components, Id id, const openvdb::Coord& sample, double voxel,
                           double reach_mm) {
-  const auto reach = static_cast<int>(std::ceil(reach_mm / voxel));
-  // The piece's samples, then a wave through void that remembers which sample it came from.
-  struct Front {
-    openvdb::Coord at, from;
-  };
-  std::deque<Front> wave;
+  std::vector<openvdb::Coord> edge, stack{sample};
   openvdb::MaskTree seen;
-  openvdb::CoordBBox box;
-  std::vector<openvdb::Coord> stack{sample};
   seen.setValueOn(sample);
-  constexpr std::array<std::array<int, 3>, 6> steps{
-      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}};
   while (!stack.empty()) {
     const openvdb::Coord at = stack.back();
     stack.pop_back();
-    bool edge = false;
-    for (const auto& s : steps) {
+    bool outermost = false;
+    for (const auto& s : face_steps) {
       const openvdb::Coord to = at.offsetBy(s[0], s[1], s[2]);
       if (components.at(to) != id) {
-        edge = true;
+        outermost = true;
       } else if (!seen.isValueOn(to)) {
         seen.setValueOn(to);
         stack.push_back(to);
       }
     }
-    if (edge) wave.push_back({at, at});
+    if (outermost) edge.push_back(at);
   }
-  const auto distance2 = [](const openvdb::Coord& a, const openvdb::Coord& b) {
-    const openvdb::Coord d = a - b;
-    return 1.0 * d.x() * d.x() + 1.0 * d.y() * d.y() + 1.0 * d.z() * d.z();
-  };
-  // First by distance, then by place, so that the answer does not depend on how the wave started.
-  const auto later = [&](const Front& a, const Front& b) {
-    const double da = distance2(a.at, a.from), db = distance2(b.at, b.from);
-    return da != db ? da > db : std::pair(a.at, a.from) > std::pair(b.at, b.from);
-  };
-  std::priority_queue<Front, std::vector<Front>, decltype(later)> queue(later,
-                                                                        std::vector<Front>(wave.begin(), wave.end()));
-  while (!queue.empty()) {
-    const Front f = queue.top();
-    queue.pop();
-    if (distance2(f.at, f.from) > 1.0 * reach * reach) break;
-    const Id here = components.at(f.at);
-    if (here != id && components.inside(f.at)) {
-      return Gap{world(f.from, voxel), world(f.at, voxel)};
-    }
-    for (const auto& s : steps) {
-      const openvdb::Coord to = f.at.offsetBy(s[0], s[1], s[2]);
-      if (seen.isValueOn(to)) continue;
-      seen.setValueOn(to);
-      queue.push({to, f.from});
-    }
-  }
-  return std::nullopt;
+  const auto found = nearest_way(
+      edge, seen, std::ceil(reach_mm / voxel), [](const openvdb::Coord&) { return true; },
+      [&](const SampleWay& way) { return components.at(way.to) != id && components.inside(way.to); });
+  if (!found) return std::nullopt;
+  return Gap{world_mm(found->from, voxel), world_mm(found->to, voxel)};
 }
 
 }  // namespace
@@ -192,52 +144,9 @@ CleanResult clean(const Solid& solid, const CleanParams& params, const Context& 
     }
   });
   result.solid = make_solid(grid, solid.grid());
+  // A void that was filled may have been all that kept two pieces apart.
+  if (result.filled > 0 && result.left.material.size() > 1) result.left = pieces(result.solid, context);
   return result;
-}
-
-std::vector<Piece> unreached(const Solid& solid, const Shape& anchor, double neck_mm, const Context& context) {
-  const Grid grid = solid.grid();
-  // A member of this width keeps a chain of neighbouring samples this deep, however it lies on the lattice.
-  const double depth = std::clamp(0.5 * neck_mm - grid.voxel_mm, 0.0, (grid.band_vox - 0.5) * grid.voxel_mm);
-  const Components components(solid, context, -static_cast<float>(depth));
-  if (components.empty()) return {};
-  auto list = components.list();
-  std::vector<Id> loose;
-  for (const auto& c : list)
-    if (c.inside) loose.push_back(c.id);
-  std::sort(loose.begin(), loose.end());
-  std::vector<bool> reached(loose.size(), false);
-  components.each_block([&](const openvdb::Coord& origin, const LeafLabels* labels, Id offset) {
-    // Most blocks hold nothing but what is known to be reached: no need to ask for the anchor there.
-    const std::size_t kinds = labels != nullptr ? labels->voxels.size() : 1;
-    std::vector<std::size_t> open(kinds, loose.size());
-    bool any = false;
-    for (std::size_t k = 0; k < kinds; ++k) {
-      const Id id = components.find(offset + static_cast<Id>(k));
-      const auto at = std::lower_bound(loose.begin(), loose.end(), id);
-      if (at == loose.end() || *at != id) continue;
-      open[k] = static_cast<std::size_t>(at - loose.begin());
-      any = any || !reached[open[k]];
-    }
-    if (!any) return;
-    std::array<float, Leaf::SIZE> x, y, z, value;
-    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-      const Vec3f p = to_float(world(origin + Leaf::offsetToLocalCoord(i), grid.voxel_mm));
-      x[i] = p.x, y[i] = p.y, z[i] = p.z;
-    }
-    const Vec3i leaf{origin.x(), origin.y(), origin.z()};
-    anchor.evaluate({x.data(), y.data(), z.data(), Leaf::SIZE, &leaf, grid.voxel_mm}, value.data());
-    for (std::size_t i = 0; i < Leaf::SIZE; ++i) {
-      const std::size_t slot = open[labels != nullptr ? labels->label[i] : 0];
-      if (slot < loose.size() && value[i] < 0) reached[slot] = true;
-    }
-  });
-  std::erase_if(list, [&](const Components::Component& c) {
-    const auto slot = std::lower_bound(loose.begin(), loose.end(), c.id) - loose.begin();
-    return !c.inside || reached[static_cast<std::size_t>(slot)];
-  });
-  list.insert(list.begin(), {0, false, 0, {}});  // where summarize() expects the exterior
-  return summarize(list, grid.voxel_mm).material;
 }
 
 std::vector<Gap> gaps(const Solid& solid, double reach_mm, const Context& context) {

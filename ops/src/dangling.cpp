@@ -29,19 +29,23 @@ std::array<Vec3d, probe_count> even_directions() {
   return directions;
 }
 
-/// Is there material at this distance from an end but in the direction its own stick comes from?
-bool touches(const Solid& solid, Vec3d end, Vec3d own, double reach_mm) {
+/// Is there material at this distance from a point, that the line through it along `own` with this radius does not
+/// explain? The cone around `own` is left out: there the stick's own node may be.
+bool touched(const Solid& solid, Vec3d at, Vec3d own, double line_mm, double reach_mm) {
   static const auto directions = even_directions();
-  return std::any_of(directions.begin(), directions.end(),
-                     [&](Vec3d d) { return dot(d, own) < own_cone && solid.distance(end + reach_mm * d) < 0; });
+  return std::any_of(directions.begin(), directions.end(), [&](Vec3d d) {
+    const double along = dot(d, own);
+    return along < own_cone && reach_mm * std::sqrt(1 - along * along) > line_mm &&
+           solid.distance(at + reach_mm * d) < 0;
+  });
 }
 
-class Count {
+class Search {
  public:
-  Count(const Fill& fill, const Shape& region, const Shape& body, double shell_mm, const Solid& solid)
-      : ball_mm_(0.5 * fill.ball_mm),
+  Search(const Sticks& sticks, const Shape& body, double shell_mm, const Solid& solid)
+      : ball_mm_(0.5 * sticks.ball_mm),
         skin_mm_(solid.grid().voxel_mm),
-        region_(region),
+        region_(sticks.region),
         lumen_(offset(body, -shell_mm)),
         solid_(solid) {}
 
@@ -60,8 +64,9 @@ class Count {
       if (a) node(sticks[i].a);
       if (b) node(sticks[i].b);
       if (a && b) {
-        hold(sticks[i].a, sticks[i].b);
-        hold(sticks[i].b, sticks[i].a);
+        if (solid_.distance(0.5 * (sticks[i].a + sticks[i].b)) >= 0) continue;
+        hold(sticks[i].a, sticks[i]);
+        hold(sticks[i].b, sticks[i]);
       } else if (a) {
         leave(sticks[i], false);
       } else if (b) {
@@ -70,11 +75,14 @@ class Count {
     }
   }
 
-  [[nodiscard]] std::int64_t result() const {
-    std::int64_t free = free_;
+  [[nodiscard]] std::vector<LooseEnd> result() const {
+    std::vector<LooseEnd> free = free_;
     for (const auto& [key, node] : nodes_) {
       if (node.sticks > 1 || solid_.distance(node.at) >= 0) continue;
-      if (node.sticks == 0 || !touches(solid_, node.at, node.towards, ball_mm_ + skin_mm_)) ++free;
+      const bool alone = node.sticks == 0;
+      const Vec3d own = alone ? Vec3d{} : normalized(node.other - node.at);
+      if (touched(solid_, node.at, own, 0, ball_mm_ + skin_mm_)) continue;
+      free.push_back({alone ? node.at : held(node.at, node.other, node.radius_mm), node.at, node.radius_mm, ball_mm_});
     }
     return free;
   }
@@ -82,16 +90,30 @@ class Count {
  private:
   using Key = std::tuple<long, long, long>;
   struct Node {
-    Vec3d at, towards{};
+    Vec3d at, other{};
+    double radius_mm = 0;
     int sticks = 0;
   };
 
   static Key key(Vec3d p) { return {std::lround(1e4 * p.x), std::lround(1e4 * p.y), std::lround(1e4 * p.z)}; }
   Node& node(Vec3d p) { return nodes_.try_emplace(key(p), Node{p}).first->second; }
-  void hold(Vec3d at, Vec3d other) {
+  void hold(Vec3d at, const Capsule& stick) {
     Node& n = node(at);
     ++n.sticks;
-    n.towards = normalized(other - at);
+    n.other = key(at) == key(stick.a) ? stick.b : stick.a;
+    n.radius_mm = stick.radius_mm;
+  }
+  [[nodiscard]] bool beside(Vec3d at, Vec3d own, double radius_mm) const {
+    return touched(solid_, at, own, radius_mm + 0.5 * skin_mm_, radius_mm + skin_mm_);
+  }
+
+  /// Where, from its end back to the ball of its node, something other than itself holds a stick.
+  [[nodiscard]] Vec3d held(Vec3d end, Vec3d from, double radius_mm) const {
+    const double length = std::max(0.0, norm(end - from) - ball_mm_);
+    const Vec3d back = normalized(from - end);
+    for (double s = 0; s < length; s += skin_mm_)
+      if (solid_.distance(end + s * back) < 0 && beside(end + s * back, back, radius_mm)) return end + s * back;
+    return end + length * back;
   }
 
   /// A stick with one node inside: into the shell, or out of the part.
@@ -103,38 +125,48 @@ class Count {
       const Vec3d p = from + middle * (to - from);
       (lumen_(p) < 0 && region_(p) < 0 ? in : out) = middle;
     }
-    const Vec3d end = from + in * (to - from);
-    const bool in_shell = lumen_(from + out * (to - from)) >= 0;
-    if (in_shell || touches(solid_, end, normalized(from - to), stick.radius_mm + skin_mm_)) {
-      hold(from, to);
-    } else if (norm(end - from) > ball_mm_ + stick.radius_mm) {
-      ++free_;
-      hold(from, to);
+    if (solid_.distance(from + 0.5 * in * (to - from)) >= 0) return;  // it is not there
+    if (lumen_(from + out * (to - from)) >= 0) return hold(from, stick);
+    // Out of the part: on and on, as far as there is material.
+    const double length = norm(to - from);
+    const Vec3d along = (1 / length) * (to - from);
+    double end = in * length;
+    while (end > 0 && solid_.distance(from + end * along) >= 0) end -= skin_mm_;
+    bool knob = false;  // some of the ball of the node that was cut off
+    for (double s = std::max(end, 0.0); s < length && solid_.distance(from + s * along) < 0; s += skin_mm_) {
+      knob = s > length - ball_mm_ - skin_mm_;
+      if (beside(from + s * along, -along, knob ? ball_mm_ : stick.radius_mm)) return hold(from, stick);
+      end = s;
     }
+    if (end > length - skin_mm_) return hold(from, stick);
+    if (end <= ball_mm_ + stick.radius_mm) return;
+    hold(from, stick);
+    const Vec3d tip = from + end * along;
+    free_.push_back({held(tip, from, stick.radius_mm), tip, stick.radius_mm, knob ? ball_mm_ : 0});
   }
 
   const double ball_mm_, skin_mm_;
   const Shape region_, lumen_;
   const Solid& solid_;
   std::map<Key, Node> nodes_;
-  std::int64_t free_ = 0;
+  std::vector<LooseEnd> free_;
 };
 
 }  // namespace
 
-std::int64_t dangling_sticks(const Fill& fill, const Box3d& box, const Shape& region, const Shape& body,
-                             double shell_mm, const Solid& solid, const Context& context) {
-  Count count(fill, region, body, shell_mm, solid);
+std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double shell_mm, const Solid& solid,
+                                 const Context& context) {
+  Search search(sticks, body, shell_mm, solid);
   std::vector<Capsule> batch;
-  fill.sticks(box, [&](const Capsule& stick) {
+  sticks.visit(sticks.box, [&](const Capsule& stick) {
     batch.push_back(stick);
     if (batch.size() < batch_size) return;
     context.check();
-    count.add(batch);
+    search.add(batch);
     batch.clear();
   });
-  count.add(batch);
-  return count.result();
+  search.add(batch);
+  return search.result();
 }
 
 }  // namespace fibrolite

@@ -10,6 +10,7 @@
 #include "fibrolite/ops/measure.h"
 #include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/tie.h"
+#include "fibrolite/ops/trim.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
@@ -85,10 +86,13 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   out.body = distance_to(body);
   const Shape whole = compose(out.body, out.parts, fills, out.joints, params.infill, recipe, assembly);
   const Solid raw = run("realize", 0.80, [&](const Context& c) { return realize(whole, body, c); });
-  const Tied tied =
-      run("one piece", 0.95, [&](const Context& c) { return tie(raw, whole, body, tie_params(recipe, voxel), c); });
+  const std::vector<Sticks> sticks = sticks_of(out.parts, fills);
+  const TieParams ties = tie_params(recipe, params.infill, out.body, voxel);
+  const Tied tied = run("one piece", 0.95, [&](const Context& c) {
+    return trim(tie(raw, whole, body, ties, c), body, sticks, shell_mm, ties, c);
+  });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
-    return checked_and_mended(tied, body, fills, recipe, params.fix, report, c);
+    return checked_and_mended(tied, body, fills, sticks, ties, recipe, params.fix, report, c);
   });
   out.solid = mended.tied.solid;
 
@@ -97,8 +101,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     for (const Part& part : out.parts.parts) regions.push_back(part.region());
     report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
     report_joints(out.interfaces, out.joints, demand_n, recipe, report);
-    report_solid(mended.tied, body, recipe.material, report);
-    report_weak_places(out.parts, fills, body, out.solid, recipe, params.infill, report, c);
+    report_solid(mended.tied, fills, body, recipe.material, report);
   });
   if (params.function) {
     const Shape smooth =

@@ -33,20 +33,11 @@ void add_balls(const std::vector<Spot>& spots, bool wall, const MendParams& para
   }
 }
 
-/// The tied solid, changed to `solid` and made one piece again.
-void take(Tied& tied, const Solid& solid, const Solid& body, const TieParams& params, const Context& context) {
-  const Tied now = tie(solid, distance_to(solid), body, params, context);
-  tied.solid = now.solid;
-  tied.left = now.left;
-  tied.dropped += now.dropped;
-  tied.filled += now.filled;
-  tied.struts.insert(tied.struts.end(), now.struts.begin(), now.struts.end());
-}
-
 }  // namespace
 
 Shape with_mends(const Shape& whole, const Shape& body, const Mended& m) {
   Shape result = whole;
+  if (!m.tied.removed.empty()) result = subtract(result, capsules(m.tied.removed));
   if (!m.tied.struts.empty()) result = unite({result, intersect({body, capsules(m.tied.struts)})});
   if (!m.thickened.empty()) result = unite({result, intersect({body, capsules(m.thickened)})});
   if (!m.drains.empty()) result = subtract(result, capsules(shapes(m.drains)));
@@ -64,7 +55,7 @@ Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const
     add_balls(found.gaps, false, params, voxel, balls);
     if (balls.empty()) break;
     const Shape thicker = unite({distance_to(out.tied.solid), intersect({b, capsules(balls)})});
-    take(out.tied, realize(thicker, body, context), body, params.tie, context);
+    out.tied = tie_again(out.tied, realize(thicker, body, context), body, params.tie, context);
     out.thickened.insert(out.thickened.end(), balls.begin(), balls.end());
   }
   if (params.drain_mm == 0) return out;
@@ -77,9 +68,11 @@ Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const
   for (int round = 0; round < rounds && !out.tied.left.cavities.empty(); ++round) {
     const auto holes =
         drains(out.tied.solid, {.hole_mm = params.drain_mm, .up = params.up, .reach_mm = 4 * params.shell_mm}, context);
-    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(shapes(holes)));
-    take(out.tied, realize(drilled, body, context), body, params.tie, context);
     out.drains.insert(out.drains.end(), holes.begin(), holes.end());
+    TieParams around = params.tie;
+    around.keep_out = capsules(shapes(out.drains));
+    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(shapes(holes)));
+    out.tied = tie_again(out.tied, realize(drilled, body, context), body, around, context);
   }
   return out;
 }

@@ -105,6 +105,9 @@ Json to_json(const SolidReport& solid) {
           {"voids_filled", solid.voids_filled},
           {"dangling", solid.dangling},
           {"unreached", solid.unreached},
+          {"necks_thickened", solid.necks_thickened},
+          {"tips_tied", solid.tips_tied},
+          {"tips_removed", solid.tips_removed},
           {"active_voxels", solid.active_voxels},
           {"voxel_mm", solid.voxel_mm}};
 }

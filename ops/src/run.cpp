@@ -11,6 +11,7 @@
 #include "fibrolite/blocks.h"
 #include "fibrolite/ops/grading.h"
 #include "fibrolite/ops/sleeve.h"
+#include "fibrolite/ops/trim.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
 
@@ -92,8 +93,24 @@ Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& b
 
 double section_pixel(const Recipe& recipe) { return std::min(0.25 * recipe.mfs.wall_mm, 0.1); }
 
-TieParams tie_params(const Recipe& recipe, double voxel_mm) {
-  return {.strut_mm = std::max(members(recipe.tcs).least_mm, 2 * voxel_mm), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
+std::vector<Sticks> sticks_of(const Parts& parts, const std::vector<Fill>& fills) {
+  std::vector<Sticks> sticks;
+  for (std::size_t i = 0; i < fills.size(); ++i) {
+    const Part& part = parts.parts[i];
+    if (fills[i].sticks) sticks.push_back({fills[i].sticks, fills[i].ball_mm, part.bounds_mm(), part.region()});
+  }
+  return sticks;
+}
+
+TieParams tie_params(const Recipe& recipe, InfillKind infill, const Shape& body, double voxel_mm) {
+  const double thinnest = thinnest_mm(recipe, infill), strut = members(recipe.tcs).least_mm;
+  TieParams params{.strut_mm = std::max(strut, 2 * voxel_mm), .reach_mm = 2 * recipe.tcs.cell_mm.most()};
+  if (std::isfinite(thinnest)) {
+    params.neck_mm = thinnest;
+    params.strut_mm = std::max(params.strut_mm, thinnest);
+    params.anchor = shell(body, recipe.shell.thickness_mm);
+  }
+  return params;
 }
 
 std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
@@ -131,16 +148,21 @@ Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fi
   return assemble(body, filled, shapes, params);
 }
 
-Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills, const Recipe& recipe,
-                          bool fix, Report& report, const Context& context) {
+Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
+                          const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe, bool fix,
+                          Report& report, const Context& context) {
   const PrintParams& limits = recipe.print;
   const double voxel = body.grid().voxel_mm, shell_mm = recipe.shell.thickness_mm;
-  const TieParams ties = tie_params(recipe, voxel);
   const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
   Mended out{tied, {}, {}, 0};
   const bool mending = fix || drain_mm > 0;
   if (!mending && !limits.check) return out;
-  if (mending) out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
+  if (mending) {
+    out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
+    TieParams around = ties;
+    around.keep_out = capsules(shapes(out.drains));
+    out.tied = trim(out.tied, body, sticks, shell_mm, around, context);
+  }
   double node_mm = 2 * limits.wall_mm;
   for (const Fill& fill : fills) node_mm = std::max(node_mm, fill.ball_mm);
   const Shape lumen = offset(distance_to(body), -0.5 * shell_mm);
@@ -234,6 +256,7 @@ std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid&
     add("fill_" + std::to_string(i), clip({made.parts.parts[i].region(), fills[i].shape}, params));
   }
   for (std::size_t i = 0; i < made.joints.size(); ++i) add("joint_" + std::to_string(i), made.joints[i].shape);
+  if (!mended.tied.removed.empty()) add("removed", capsules(mended.tied.removed));
   if (!mended.tied.struts.empty()) add("ties", capsules(mended.tied.struts));
   if (!mended.thickened.empty()) add("thickened", capsules(mended.thickened));
   if (!mended.drains.empty()) add("drains", capsules(shapes(mended.drains)));

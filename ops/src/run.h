@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "fibrolite/ops/assemble.h"
+#include "fibrolite/ops/dangling.h"
 #include "fibrolite/ops/fill.h"
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/measure.h"
@@ -54,9 +55,11 @@ class Run {
 [[nodiscard]] std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& interfaces,
                                           const std::vector<Fill>& fills, const Recipe& recipe, const Shape& body,
                                           const Context& context);
-/// Ties as thick as the thinnest member of the recipe, at least two voxels.
-[[nodiscard]] TieParams tie_params(const Recipe& recipe, double voxel_mm);
-
+/// Of the fills that are made of sticks.
+[[nodiscard]] std::vector<Sticks> sticks_of(const Parts& parts, const std::vector<Fill>& fills);
+/// Ties as thick as the thinnest member of the recipe, at least two voxels; nothing may hang on the shell by less.
+/// `body`: its distance.
+[[nodiscard]] TieParams tie_params(const Recipe& recipe, InfillKind infill, const Shape& body, double voxel_mm);
 /// All that makes a printed solid of a body.
 struct Design {
   InfillKind infill = InfillKind::Hybrid;
@@ -80,7 +83,8 @@ struct Design {
 [[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
-                                        const Recipe& recipe, bool fix, Report& report, const Context& context);
+                                        const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe,
+                                        bool fix, Report& report, const Context& context);
 /// Every step as a grid of its own (see Hybrid::steps).
 [[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
                                             const std::vector<Fill>& fills, const Mended& mended,
@@ -92,11 +96,10 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 /// `demand_n`: one per interface.
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
                    const std::vector<double>& demand_n, const Recipe& recipe, Report& report);
-void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report);
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,
+                  Report& report);
 /// Of a solid that is not held: all but its samples' number and size.
-void report_solid(const Tied& tied, double body_mm3, double solid_mm3, const Material& material, Report& report);
-/// What hangs free, and what hangs on the shell by too thin a neck.
-void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
-                        const Recipe& recipe, InfillKind infill, Report& report, const Context& context);
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, double body_mm3, double solid_mm3,
+                  const Material& material, Report& report);
 
 }  // namespace fibrolite

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fibrolite/ops/dangling.h"
 #include "fibrolite/pieces.h"
-#include "fibrolite/realize.h"
 #include "run.h"
 
 namespace fibrolite {
@@ -83,13 +81,15 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
   }
 }
 
-void report_solid(const Tied& tied, const Solid& body, const Material& material, Report& report) {
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,
+                  Report& report) {
   report.solid.active_voxels = tied.solid.active_voxels();
   report.solid.voxel_mm = body.grid().voxel_mm;
-  report_solid(tied, body.volume_mm3(), tied.solid.volume_mm3(), material, report);
+  report_solid(tied, fills, body.volume_mm3(), tied.solid.volume_mm3(), material, report);
 }
 
-void report_solid(const Tied& tied, double body_mm3, double solid_mm3, const Material& material, Report& report) {
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, double body_mm3, double solid_mm3,
+                  const Material& material, Report& report) {
   SolidReport& out = report.solid;
   out.volume_mm3 = solid_mm3;
   out.fill_ratio = body_mm3 > 0 ? out.volume_mm3 / body_mm3 : 0;
@@ -98,6 +98,12 @@ void report_solid(const Tied& tied, double body_mm3, double solid_mm3, const Mat
   out.cavities = static_cast<std::int64_t>(tied.left.cavities.size());
   for (const Piece& cavity : tied.left.cavities) out.cavity_volume_mm3 += cavity.volume_mm3;
   out.ties = static_cast<std::int64_t>(tied.struts.size());
+  out.necks_thickened = tied.necks;
+  out.tips_tied = tied.tips_tied;
+  out.tips_removed = tied.tips_removed;
+  out.dangling = tied.dangling;
+  for (const Fill& fill : fills) out.dangling += fill.free_edges;
+  out.unreached = static_cast<std::int64_t>(tied.unreached.size());
   out.specks_removed = tied.dropped;
   out.voids_filled = tied.filled;
   report.model.volume_mm3 = body_mm3;
@@ -105,23 +111,6 @@ void report_solid(const Tied& tied, double body_mm3, double solid_mm3, const Mat
     report.warnings.push_back("the solid has " + std::to_string(out.pieces) +
                               " pieces: the model itself has pieces too far apart to tie");
   }
-}
-
-void report_weak_places(const Parts& parts, const std::vector<Fill>& fills, const Solid& body, const Solid& solid,
-                        const Recipe& recipe, InfillKind infill, Report& report, const Context& context) {
-  const Shape depth = distance_to(body);
-  const double shell_mm = recipe.shell.thickness_mm;
-  for (std::size_t i = 0; i < fills.size(); ++i) {
-    report.solid.dangling += fills[i].free_edges;
-    if (!fills[i].sticks) continue;
-    const Part& part = parts.parts[i];
-    report.solid.dangling +=
-        dangling_sticks(fills[i], part.bounds_mm(), part.region(), depth, shell_mm, solid, context);
-  }
-  const double thinnest = thinnest_mm(recipe, infill);
-  if (!std::isfinite(thinnest)) return;
-  report.solid.unreached =
-      static_cast<std::int64_t>(unreached(solid, shell(depth, shell_mm), thinnest, context).size());
 }
 
 }  // namespace fibrolite

@@ -7,6 +7,7 @@
 
 #include "fibrolite/error.h"
 #include "fibrolite/piece_sweep.h"
+#include "fibrolite/reach.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
@@ -18,6 +19,7 @@ namespace {
 constexpr int rounds = 3;  // as tie()
 
 Context quiet(const Context& context) { return context.part(0, 0, ""); }
+double& coordinate(Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 int& along(Vec3i& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 }  // namespace
@@ -55,43 +57,115 @@ struct SolidStream::Impl {
     return realize(with_mends(over(b), b, made), body, context);
   }
 
-  /// Loose pieces are tied, specks and micro-voids noted.
+  /// Loose pieces are tied, then what hangs on too thin a neck; specks and micro-voids are noted. As tie() does, but
+  /// each loose thing is looked at with what lies around it alone.
   void make_one_piece(const Context& context) {
-    const TieParams params = tie_params(design.recipe, grid.voxel_mm);
-    for (int round = 0;; ++round) {
-      PieceSweep sweep(grid, {.axis = plan.axis, .clean = params.clean});
-      for (std::size_t i = 0; i + 1 < plan.borders.size(); ++i) {
-        context.check();
-        const Solid solid = raw(body(i, 0, quiet(context)), quiet(context));
-        sweep.add(solid, range(i).low, range(i).high, nothing(), quiet(context));
-        context.progress(static_cast<double>(i + 1) / static_cast<double>(measured.size()));
-      }
-      found = sweep.finish();
+    const TieParams params = tie_params(design.recipe, design.infill, everything(), grid.voxel_mm);
+    bool fresh = true;  // the sweeps have seen all struts
+    for (int round = 0; round <= rounds; ++round) {
+      sweep(params, context);
       if (found.left.material.empty()) {
         throw Error(Code::BadInput, "the mesh encloses no volume at this voxel", {},
                     "close it, give it thickness, or use a smaller --voxel");
       }
-      if (found.left.material.size() == 1 || round == rounds || !tie_loose(params, context)) break;
+      if (round == rounds || found.left.material.size() == 1) break;
+      fresh = !tie_loose(params, context);
+      if (fresh) break;
     }
+    for (int round = 0; params.neck_mm > 0; ++round) {
+      if (!fresh) sweep(params, context);
+      std::vector<Piece> left;
+      if (!tie_necks(params, round < rounds, left, context)) {
+        made.tied.unreached = std::move(left);
+        break;
+      }
+      fresh = false;
+    }
+    if (found.filled > 0 && found.left.material.size() > 1) recount(context);
     made.tied.dropped = found.dropped;
     made.tied.filled = found.filled;
     made.tied.left = found.left;
   }
 
-  /// A strut from each loose piece to the nearest other, each looked at with what lies around it alone.
+  void sweep(const TieParams& params, const Context& context) {
+    PieceSweep pieces(grid, {.axis = plan.axis, .clean = params.clean});
+    PieceSweep necks(grid, {.axis = plan.axis, .below = -skin_mm(params.neck_mm, grid)});
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      context.check();
+      const Solid body_here = body(i, 0, quiet(context)), solid = raw(body_here, quiet(context));
+      pieces.add(solid, range(i).low, range(i).high, nothing(), quiet(context));
+      if (params.neck_mm > 0) {
+        const Shape anchor = shell(distance_to(body_here), design.assembly.shell_mm);
+        necks.add(solid, range(i).low, range(i).high, anchor, quiet(context));
+      }
+      context.progress(static_cast<double>(i + 1) / static_cast<double>(measured.size()));
+    }
+    found = pieces.finish();
+    hanging = necks.finish();
+  }
+
+  /// A void that was filled may have been all that kept two pieces apart.
+  void recount(const Context& context) {
+    PieceSweep pieces(grid, {.axis = plan.axis});
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      context.check();
+      const Solid solid = flipped(raw(body(i, 0, quiet(context)), quiet(context)), found.flips);
+      pieces.add(solid, range(i).low, range(i).high, nothing(), quiet(context));
+    }
+    found.left = pieces.finish().left;
+  }
+
+  struct Window {
+    Solid body, solid;
+    Box3d inner;  ///< What does not touch its border.
+  };
+  [[nodiscard]] Window window(SampleBox box, double reach_mm, const Context& context) const {
+    const auto reach = static_cast<int>(std::ceil(reach_mm / grid.voxel_mm)) + 8;
+    for (int axis = 0; axis < 3; ++axis) {
+      along(box.min, axis) -= reach;
+      along(box.max, axis) += reach;
+    }
+    Window result;
+    result.body = voxels.within(box, quiet(context));
+    result.solid = flipped(raw(result.body, quiet(context)), found.flips);
+    const auto corner = [&](Vec3i v) { return grid.voxel_mm * Vec3d{1.0 * v.x, 1.0 * v.y, 1.0 * v.z}; };
+    result.inner.include(corner(box.min));
+    result.inner.include(corner(box.max));
+    result.inner = result.inner.grown(-4 * grid.voxel_mm);
+    return result;
+  }
+
+  /// A strut from each loose piece to the nearest other.
   bool tie_loose(const TieParams& params, const Context& context) {
-    const auto reach = static_cast<int>(std::ceil(params.reach_mm / grid.voxel_mm)) + 1;
+    const std::size_t before = made.tied.struts.size();
     std::vector<Capsule> struts;
     for (std::size_t i = 1; i < found.left.material.size(); ++i) {
-      SampleBox box = found.boxes[i];
-      for (int axis = 0; axis < 3; ++axis) {
-        along(box.min, axis) -= reach;
-        along(box.max, axis) += reach;
-      }
-      const Solid around = flipped(raw(voxels.within(box, quiet(context)), quiet(context)), found.flips);
-      const auto gap = gap_from(around, found.left.material[i].sample_mm, params.reach_mm, quiet(context));
+      const Window around = window(found.boxes[i], params.reach_mm, context);
+      const auto gap = gap_from(around.solid, found.left.material[i].sample_mm, params.reach_mm, quiet(context));
       if (gap) struts.push_back(strut(*gap, params.strut_mm));
     }
+    made.tied.struts.insert(made.tied.struts.end(), struts.begin(), struts.end());
+    return made.tied.struts.size() > before;
+  }
+
+  /// A strut along each neck that is too thin. What leaves the window counts as reached: only what the sweep found,
+  /// which lies well within, is asked about.
+  bool tie_necks(const TieParams& params, bool tie, std::vector<Piece>& left, const Context& context) {
+    std::vector<Capsule> struts;
+    for (std::size_t i = 0; i < hanging.left.material.size(); ++i) {
+      if (hanging.held[i]) continue;
+      const Window around = window(hanging.boxes[i], params.reach_mm, context);
+      const Shape anchor =
+          unite({shell(distance_to(around.body), design.assembly.shell_mm), complement(cuboid(around.inner))});
+      for (const Unreached& one :
+           unreached(around.solid, anchor, {params.neck_mm, tie ? params.reach_mm : 0}, quiet(context))) {
+        const auto same = [&](const Piece& p) { return p.sample_mm == one.piece.sample_mm; };
+        if (std::any_of(left.begin(), left.end(), same)) continue;  // seen in another window
+        left.push_back(one.piece);
+        if (one.way) struts.push_back(strut(*one.way, params.strut_mm));
+      }
+    }
+    made.tied.necks += static_cast<std::int64_t>(struts.size());
     made.tied.struts.insert(made.tied.struts.end(), struts.begin(), struts.end());
     return !struts.empty();
   }
@@ -116,6 +190,25 @@ struct SolidStream::Impl {
     body_vox += slab.body.volume_vox(slab.range);
     solid_vox += slab.solid.volume_vox(slab.range);
     active_voxels += slab.solid.active_voxels(slab.range);
+    count_loose_ends(slab, context);
+  }
+
+  /// Those whose end lies in the slab; the margin holds the sticks they belong to.
+  void count_loose_ends(const Slab& slab, const Context& context) {
+    const double h = grid.voxel_mm, low = slab.range.low * h, high = slab.range.high * h;
+    const double margin = (plan.margin_vox - 1) * h;
+    for (Sticks sticks : sticks_of(design.parts, design.fills)) {
+      double& from = coordinate(sticks.box.min, plan.axis);
+      double& to = coordinate(sticks.box.max, plan.axis);
+      from = std::max(from, low - margin);
+      to = std::min(to, high + margin);
+      if (from >= to) continue;
+      for (const LooseEnd& end :
+           loose_ends(sticks, distance_to(slab.body), design.assembly.shell_mm, slab.solid, quiet(context))) {
+        const double at = end.end_mm[plan.axis];
+        made.tied.dangling += at >= low && at < high ? 1 : 0;
+      }
+    }
   }
 
   void finish(Report& report) const {
@@ -128,7 +221,12 @@ struct SolidStream::Impl {
     const double h = grid.voxel_mm;
     report.solid.active_voxels = active_voxels;
     report.solid.voxel_mm = h;
-    report_solid(made.tied, body_vox * h * h * h, solid_vox * h * h * h, design.recipe.material, report);
+    report_solid(made.tied, design.fills, body_vox * h * h * h, solid_vox * h * h * h, design.recipe.material, report);
+    if (made.tied.dangling > 0) {
+      report.warnings.push_back(
+          std::to_string(made.tied.dangling) +
+          " stick ends hang free: they are only tied or removed if the whole solid fits into memory");
+    }
   }
 
   const Design design;
@@ -136,8 +234,8 @@ struct SolidStream::Impl {
   const Grid grid;
   const MeshVoxels voxels;
   std::vector<Shape> regions;
-  Mended made;  ///< The ties; the solid stays empty.
-  PieceSweep::Result found;
+  Mended made;                        ///< The ties; the solid stays empty.
+  PieceSweep::Result found, hanging;  ///< Pieces; and what a skin of half a neck cuts off.
   std::vector<bool> measured;
   std::vector<PartSums> sums;
   double body_vox = 0, solid_vox = 0;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fibrolite/ops/tie.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "fibrolite/reach.h"
 #include "fibrolite/realize.h"
 
 namespace fibrolite {
@@ -12,12 +14,30 @@ Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const Ti
   constexpr int rounds = 3;  // a strut may end on another loose piece, which the next round ties
   Tied result;
   CleanResult cleaned = clean(solid, params.clean, context);
+  const auto add = [&](const Gap& gap) { result.struts.push_back(strut(gap, params.strut_mm)); };
+  const auto make = [&] {
+    const Shape struts = subtract(intersect({distance_to(body), capsules(result.struts)}), params.keep_out);
+    cleaned = clean(realize(unite({assembled, struts}), body, context), params.clean, context);
+  };
   for (int round = 0; round < rounds && cleaned.left.material.size() > 1; ++round) {
     const auto found = gaps(cleaned.solid, params.reach_mm, context);
     if (found.empty()) break;
-    for (const Gap& gap : found) result.struts.push_back(strut(gap, params.strut_mm));
-    const Shape tied = unite({assembled, intersect({distance_to(body), capsules(result.struts)})});
-    cleaned = clean(realize(tied, body, context), params.clean, context);
+    for (const Gap& gap : found) add(gap);
+    make();
+  }
+  for (int round = 0; params.neck_mm > 0; ++round) {
+    const bool last = round == rounds;
+    const auto found =
+        unreached(cleaned.solid, params.anchor, {params.neck_mm, last ? 0 : params.reach_mm, params.keep_out}, context);
+    const std::size_t before = result.struts.size();
+    for (const Unreached& one : found)
+      if (one.way) add(*one.way);
+    if (result.struts.size() == before) {
+      for (const Unreached& one : found) result.unreached.push_back(one.piece);
+      break;
+    }
+    result.necks += static_cast<std::int64_t>(result.struts.size() - before);
+    make();
   }
   result.solid = std::move(cleaned.solid);
   result.dropped = cleaned.dropped;
@@ -27,8 +47,23 @@ Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const Ti
 }
 
 Capsule strut(const Gap& gap, double strut_mm) {
-  const Vec3d root = 0.5 * strut_mm * normalized(gap.to_mm - gap.from_mm);
+  const Vec3d along = gap.to_mm - gap.from_mm;
+  const Vec3d root = 0.5 * strut_mm / std::max(norm(along), 1e-9) * along;
   return {gap.from_mm - root, gap.to_mm + root, 0.5 * strut_mm};
+}
+
+Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
+               const Context& context) {
+  Tied now = tie(solid, distance_to(solid), body, params, context);
+  now.dropped += before.dropped;
+  now.filled += before.filled;
+  now.necks += before.necks;
+  now.tips_tied = before.tips_tied;
+  now.tips_removed = before.tips_removed;
+  now.dangling = before.dangling;
+  now.struts.insert(now.struts.begin(), before.struts.begin(), before.struts.end());
+  now.removed = before.removed;
+  return now;
 }
 
 }  // namespace fibrolite

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fibrolite/random.h"
+#include "fibrolite/reach.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/vdb.h"
 
@@ -137,10 +138,14 @@ TEST(PieceSweep, tells_what_hangs_on_nothing) {
   const Shape inner = unite({sphere({-5, 0, 0}, 2), capsule({-5, 0, 0}, {-10, 0, 0}, 1.2), sphere({5, 0, 0}, 2),
                              capsule({5, 0, 0}, {10, 0, 0}, 0.4), sphere({0, 0, 0}, 1)});
   const Solid solid = make(unite({wall, inner}));
-  const std::vector<Piece> whole = unreached(solid, wall, 1.6);
+  const std::vector<Unreached> whole = unreached(solid, wall, {.neck_mm = 1.6});
   ASSERT_EQ(whole.size(), 2U);
   for_cuts([&](int axis, int thickness) {
-    expect_same(swept(solid, axis, thickness, {.below = -(0.8 - 0.25)}, wall).loose, whole);
+    const PieceSweep::Result got = swept(solid, axis, thickness, {.below = -skin_mm(1.6, grid)}, wall);
+    std::vector<Piece> loose;
+    for (std::size_t i = 0; i < got.held.size(); ++i)
+      if (!got.held[i]) loose.push_back(got.left.material[i]);
+    expect_same(loose, {whole[0].piece, whole[1].piece});
   });
 }
 

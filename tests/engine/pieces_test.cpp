@@ -67,25 +67,14 @@ TEST(Clean, drops_specks_and_fills_pores_but_keeps_the_main_piece) {
   EXPECT_EQ(again.cavities.size(), 1U);
 }
 
-/// Two blocks on a bar that is thick, thin, or thick again at the other end: only what hangs on the thin one is
-/// unreached.
-TEST(Unreached, finds_what_hangs_on_a_thin_neck) {
-  const Shape anchor = cuboid({{-10, -4, -4}, {-6, 4, 4}}), block = cuboid({{4, -2, -2}, {8, 2, 2}});
-  const auto bar = [](double radius) { return cylinder({-7, 0.1, 0.1}, {5, 0.1, 0.1}, radius); };
-  const auto found = [&](double radius, double neck) {
-    return unreached(make(unite({anchor, block, bar(radius)})), anchor, neck);
-  };
-  EXPECT_EQ(found(0.6, 1.2).size(), 0U);  // as thick as asked for
-  EXPECT_EQ(found(0.4, 0.8).size(), 0U);
-  EXPECT_EQ(found(0.4, 1.0).size(), 0U);  // within two voxels
-  const auto thin = found(0.3, 1.4);
-  ASSERT_EQ(thin.size(), 1U);
-  const double depth = 0.7 - 0.25, side = 4 - 2 * depth;
-  EXPECT_NEAR(thin[0].volume_mm3 / (side * side * side), 1, 0.2);
-  EXPECT_NEAR(thin[0].sample_mm.x, 4 + depth, 0.3);
-  EXPECT_EQ(unreached(make(unite({anchor, block})), anchor, 0.8).size(), 1U);  // not joined at all
-  EXPECT_EQ(unreached(make(unite({anchor, block})), nothing(), 0.8).size(), 2U);
-  EXPECT_EQ(unreached(make(unite({anchor, block})), everything(), 0.8).size(), 0U);
+TEST(Clean, pieces_that_a_filled_void_kept_apart_are_counted_as_one) {
+  const Solid solid = make(unite({subtract(sphere({0, 0, 0}, 5), sphere({0, 0, 0}, 1.1)), sphere({0, 0, 0}, 0.7)}));
+  ASSERT_EQ(pieces(solid).material.size(), 2U);
+  const CleanResult result = clean(solid, {.fill_below_vox = 1000});
+  EXPECT_EQ(result.filled, 1);
+  EXPECT_EQ(pieces(result.solid).material.size(), 1U);
+  EXPECT_EQ(result.left.material.size(), 1U);
+  EXPECT_EQ(result.left.cavities.size(), 0U);
 }
 
 TEST(Gaps, finds_the_shortest_way_to_the_neighbour) {

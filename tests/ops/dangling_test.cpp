@@ -17,22 +17,19 @@ constexpr TcsParams params{.cell_mm = 6, .stick_mm = 0.8, .ball_mm = 1.6};
 constexpr Box3d box{{-9, -9, -9}, {9, 9, 9}};
 constexpr double shell_mm = 1;
 
-Fill crystal_fill() {
-  Fill fill{.shape = crystal(params)};
-  fill.sticks = [](const Box3d& where, const std::function<void(const Capsule&)>& visit) {
-    each_stick(params, where, visit);
-  };
-  fill.ball_mm = params.ball_mm;
-  return fill;
+Sticks crystal_sticks(const Shape& region) {
+  return {
+      [](const Box3d& where, const std::function<void(const Capsule&)>& visit) { each_stick(params, where, visit); },
+      params.ball_mm, box, region};
 }
 
 /// A cube with a shell; crystal below the plane, nothing above it, and between them a layer or none.
-std::int64_t count(double plane_mm, bool layer) {
+std::size_t count(double plane_mm, bool layer) {
   const Shape body = cuboid(box), low = half_space({0, 0, plane_mm}, {0, 0, 1});
   std::vector<Shape> material{subtract(body, offset(body, -shell_mm)), intersect({crystal(params), low})};
   if (layer) material.push_back(cuboid({{-9, -9, plane_mm - 0.4}, {9, 9, plane_mm + 0.8}}));
   const Solid solid = realize(intersect({body, unite(material)}), box.grown(1), {.voxel_mm = 0.2});
-  return dangling_sticks(crystal_fill(), box, low, body, shell_mm, solid);
+  return loose_ends(crystal_sticks(low), body, shell_mm, solid).size();
 }
 
 TEST(Sticks, each_once_four_to_a_node) {
@@ -54,7 +51,7 @@ TEST(Dangling, none_where_every_stick_ends_in_the_shell) {
   const Solid solid =
       realize(intersect({cuboid(box), unite({subtract(cuboid(box), offset(cuboid(box), -shell_mm)), crystal(params)})}),
               box.grown(1), {.voxel_mm = 0.2});
-  EXPECT_EQ(dangling_sticks(crystal_fill(), box, everything(), cuboid(box), shell_mm, solid), 0);
+  EXPECT_TRUE(loose_ends(crystal_sticks(everything()), cuboid(box), shell_mm, solid).empty());
 }
 
 /// A plane half way up the sticks leaves one free end for each stick it cuts inside the shell; a layer there takes
@@ -77,26 +74,48 @@ TEST(Dangling, counts_the_sticks_that_a_plane_leaves_hanging) {
 /// A plane just above a level of nodes: each node there keeps its two sticks from below, and stubs within the balls.
 TEST(Dangling, a_node_at_the_border_holds_by_its_other_sticks) { EXPECT_EQ(count(0.1, false), 0); }
 
+/// As parts are cut: at a slant to all sticks, and with an overlap of a voxel. What an end has beyond the cut on one
+/// side is its own, and holds nothing.
+TEST(Dangling, ends_cut_at_a_slant_are_not_held_by_their_own_tips) {
+  const Vec3d normal = normalized({0.3, 0.2, 1});
+  const Shape body = cuboid(box), low = half_space({0, 0, 0.75}, normal);
+  std::set<std::tuple<long, long, long>> cut;
+  each_stick(params, box, [&](const Capsule& s) {
+    const double a = dot(s.a - Vec3d{0, 0, 0.75}, normal), b = dot(s.b - Vec3d{0, 0, 0.75}, normal);
+    const Vec3d at = s.a + (a / (a - b)) * (s.b - s.a);
+    const double stub = std::min(a, b) < 0 ? norm(at - (a < 0 ? s.a : s.b)) : 0;
+    if (a * b < 0 && stub > 1.25 && stub < 1.75 && std::abs(at.x) < 7 && std::abs(at.y) < 7)
+      cut.insert({std::lround(1e4 * at.x), std::lround(1e4 * at.y), std::lround(1e4 * at.z)});
+  });
+  ASSERT_GE(cut.size(), 3U);
+  const Solid solid = realize(intersect({body, unite({subtract(body, offset(body, -shell_mm)),
+                                                      intersect({crystal(params), offset(low, 0.2)})})}),
+                              box.grown(1), {.voxel_mm = 0.2});
+  EXPECT_GE(loose_ends(crystal_sticks(low), body, shell_mm, solid).size(), cut.size());
+}
+
 TEST(Dangling, a_node_on_one_stick_is_an_end) {
-  // One stick alone, from the floor's shell up into the void.
-  Fill fill{.shape = capsule({0, 0, -9}, {0, 0, 0}, 0.4)};
-  fill.ball_mm = 0.8;
-  fill.sticks = [](const Box3d&, const std::function<void(const Capsule&)>& visit) {
-    visit({{0, 0, -9}, {0, 0, 0}, 0.4});
-    visit({{4, 0, -9}, {4, 0, 0}, 0.4});  // this one was not realized: it is no material
-  };
+  // One stick alone, from the floor's shell up into the void; another was not realized: it is no material.
+  const Capsule stick{{0, 0, -9}, {0, 0, 0}, 0.4}, absent{{4, 0, -9}, {4, 0, 0}, 0.4};
   const Shape body = cuboid(box);
   const auto solid = [&](const Shape& more) {
-    return realize(intersect({body, unite({subtract(body, offset(body, -shell_mm)), fill.shape, more})}), box.grown(1),
-                   {.voxel_mm = 0.2});
+    const Shape whole = unite({subtract(body, offset(body, -shell_mm)), capsules({stick}), more});
+    return realize(intersect({body, whole}), box.grown(1), {.voxel_mm = 0.2});
   };
-  EXPECT_EQ(dangling_sticks(fill, box, everything(), body, shell_mm, solid(nothing())), 1);
+  const auto found = [&](const std::vector<Capsule>& list, const Shape& more) {
+    const Sticks sticks{[list](const Box3d&, const std::function<void(const Capsule&)>& visit) {
+                          for (const Capsule& s : list) visit(s);
+                        },
+                        0.8, box, everything()};
+    return loose_ends(sticks, body, shell_mm, solid(more));
+  };
+  const auto free = found({stick, absent}, nothing());
+  ASSERT_EQ(free.size(), 1U);
+  EXPECT_EQ(norm(free[0].end_mm - stick.b), 0);
+  EXPECT_EQ(free[0].knob_mm, 0.4);
+  EXPECT_NEAR(free[0].held_mm.z, -8, 0.7);                     // the shell's inner face
   const Shape beam = capsule({-9, 0, 0.5}, {9, 0, 0.5}, 0.4);  // carries its head
-  Fill one = fill;
-  one.sticks = [](const Box3d&, const std::function<void(const Capsule&)>& visit) {
-    visit({{0, 0, -9}, {0, 0, 0}, 0.4});
-  };
-  EXPECT_EQ(dangling_sticks(one, box, everything(), body, shell_mm, solid(beam)), 0);
+  EXPECT_TRUE(found({stick}, beam).empty());
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fibrolite/pieces.h"
 #include "fibrolite/random.h"
+#include "fibrolite/realize.h"
 #include "hybrid_runs.h"
 #include "models.h"
 #include "refusal.h"
@@ -15,6 +17,7 @@ namespace fibrolite {
 namespace {
 
 using testing::hybridized;
+using testing::Outcome;
 using testing::refusal;
 using testing::sturdy;
 
@@ -139,6 +142,25 @@ TEST(Overrides, ARegionRoundAHoleStaysSolid) {
   }
 }
 
+// Crystal beside a part with nothing in it, and no joint to catch its sticks: none ends in the void, in the solid and
+// in its function.
+TEST(Overrides, CrystalBesideAnEmptyPartKeepsNoEndInTheVoid) {
+  Recipe recipe = sturdy();
+  recipe.joint.enabled = false;
+  recipe.partition.overrides.cuts.push_back({{22, 18, 15}, {1, 0.3, 0.2}});
+  recipe.partition.overrides.parts = {{0, PartInfill::Tcs}, {1, PartInfill::Shell}};
+  const Outcome out = hybridized(block({44, 36, 30}), {.recipe = recipe, .voxel_mm = 0.5, .function = true});
+  const SolidReport& solid = out.report.solid;
+  EXPECT_GT(solid.tips_removed, 5);
+  EXPECT_EQ(solid.dangling, 0);
+  EXPECT_EQ(solid.unreached, 0);
+  EXPECT_EQ(solid.pieces, 1);
+  const Box3d box{{-1, -1, -1}, {45, 37, 31}};
+  const Solid function = realize(out.hybrid.printed, box, out.hybrid.solid.grid());
+  EXPECT_EQ(pieces(function).material.size(), 1U);
+  EXPECT_NEAR(function.volume_mm3() / solid.volume_mm3, 1, 0.01);
+}
+
 // Whatever planes part a box, and whatever fills the parts: one piece, joined at every border.
 TEST(Overrides, RandomPartsOfABoxAreAlwaysOnePiece) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -161,6 +183,7 @@ TEST(Overrides, RandomPartsOfABoxAreAlwaysOnePiece) {
     EXPECT_GT(parts, cuts);
     EXPECT_EQ(report.solid.pieces, 1) << "seed " << seed;
     EXPECT_EQ(report.solid.dangling, 0) << "seed " << seed;
+    EXPECT_EQ(report.solid.unreached, 0) << "seed " << seed;
     EXPECT_GE(static_cast<int>(report.interfaces.size()), parts - 1) << "seed " << seed;
     for (const InterfaceReport& i : report.interfaces) {
       EXPECT_EQ(i.regions_after, 1) << "seed " << seed << ", parts " << i.a << " and " << i.b;

@@ -66,7 +66,7 @@ TEST(Report, HasEveryKeyOfSchemaOne) {
                           "columns", "contact_area_mm2", "capacity_over_demand"})
     EXPECT_TRUE(report.at("interfaces").at(0).contains(key)) << key;
   for (const char* key : {"volume_mm3", "fill_ratio", "mass_g", "pieces", "cavities", "cavity_volume_mm3", "dangling",
-                          "unreached", "active_voxels", "voxel_mm"})
+                          "unreached", "necks_thickened", "tips_tied", "tips_removed", "active_voxels", "voxel_mm"})
     EXPECT_TRUE(report.at("solid").contains(key)) << key;
   for (const char* key : {"volume_mm3", "triangles", "vertices", "boundary_edges", "nonmanifold_edges",
                           "nonmanifold_vertices", "degenerate_triangles", "shells"})

@@ -41,7 +41,7 @@ class PieceSweep {
 
   struct Result {
     Pieces left;                   ///< As after clean(): the same, however the solid was cut.
-    std::vector<Piece> loose;      ///< Of left.material, those not held, largest first.
+    std::vector<bool> held;        ///< Of left.material, which have a sample in an anchor.
     std::vector<SampleBox> boxes;  ///< Of left.material, the blocks each reaches into.
     std::int64_t dropped = 0, filled = 0;
     Flips flips;

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "fibrolite/context.h"
-#include "fibrolite/shape.h"
 #include "fibrolite/solid.h"
 
 namespace fibrolite {
@@ -53,13 +52,6 @@ struct CleanResult {
 };
 /// Remove loose specks and fill micro-voids; the largest piece always stays.
 [[nodiscard]] CleanResult clean(const Solid& solid, const CleanParams& params = {}, const Context& context = {});
-
-/// Material that hangs on `anchor` (where that is negative) only through necks clearly thinner than `neck_mm`: the
-/// pieces, largest first, that taking half a neck less one voxel off the surface cuts off. So a neck is found if it is
-/// thinner than neck_mm - 2 voxels, and never if it is neck_mm thick; composed values, which understate the depth of a
-/// union, may add a few. Each is given without that skin. neck_mm > 0, at most twice the band. Cost: as pieces().
-[[nodiscard]] std::vector<Piece> unreached(const Solid& solid, const Shape& anchor, double neck_mm,
-                                           const Context& context = {});
 
 /// A way from a loose piece to the nearest other material.
 struct Gap {

@@ -36,8 +36,9 @@ struct Hybrid {
   Labels candidates;  ///< Of the partition, before touching bulk became one part; of other infills: one.
   std::vector<Interface> interfaces;
   std::vector<Joint> joints;
-  /// If asked for: body, shell, fill_<part>, joint_<n>, ties, thickened, drains (holes), specks (removed), pores
-  /// (filled), solid. The union of shell, fills, joints, ties, thickened and pores less drains and specks is the solid.
+  /// If asked for: body, shell, fill_<part>, joint_<n>, removed (stick ends), ties, thickened, drains (holes), specks
+  /// (removed), pores (filled), solid. The union of shell, fills and joints, less what is removed, with ties, thickened
+  /// and pores, less drains and specks, is the solid.
   std::vector<NamedSolid> steps;
   Shape body;  ///< Distance to the model, as far in as the shell goes.
   /// If asked for: the solid as a function, sharper than its voxels: body, shell, fills, joints and ties as composed,

@@ -41,9 +41,11 @@ struct SolidReport {
   double volume_mm3 = 0, fill_ratio = 0, mass_g = 0;
   std::int64_t pieces = 0, cavities = 0;
   double cavity_volume_mm3 = 0;
-  std::int64_t ties = 0;            ///< Struts added to loose pieces.
-  std::int64_t specks_removed = 0;  ///< Loose pieces of a few voxels.
-  std::int64_t voids_filled = 0;    ///< Micro-voids.
+  std::int64_t ties = 0;                         ///< Struts added to loose pieces.
+  std::int64_t necks_thickened = 0;              ///< Of those, along necks that were too thin.
+  std::int64_t tips_tied = 0, tips_removed = 0;  ///< Stick ends that would have ended in the void.
+  std::int64_t specks_removed = 0;               ///< Loose pieces of a few voxels.
+  std::int64_t voids_filled = 0;                 ///< Micro-voids.
   std::int64_t dangling = 0;  ///< Sticks that end in the void; membranes that do, in the middle section of a column.
   std::int64_t unreached =
       0;  ///< Material that hangs on the shell only through necks thinner than the thinnest member.

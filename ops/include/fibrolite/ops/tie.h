@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One piece of material: specks go, loose pieces are tied in, micro-voids are filled.
+// One piece of material that hangs together: specks go, loose pieces are tied in, micro-voids are filled, thin necks
+// thickened.
 #pragma once
 
 #include <vector>
@@ -15,18 +16,31 @@ struct TieParams {
   double strut_mm = 0.8;  ///< Diameter of a tie; 2 voxels or more.
   double reach_mm = 12;   ///< Longest tie.
   CleanParams clean{};
+  double neck_mm = 0;  ///< What hangs on `anchor` by less is tied too; at most strut_mm; 0: anything holds.
+  Shape anchor = everything();
+  Shape keep_out = nothing();  ///< Where no tie may lie: drain holes.
 };
 struct Tied {
   Solid solid;
   std::vector<Capsule> struts;
+  std::vector<Capsule> removed{};  ///< Taken off the whole before the struts were added (trim.h).
   std::int64_t dropped = 0, filled = 0;
+  std::int64_t necks = 0;                        ///< Of the struts, those along necks that were too thin.
+  std::int64_t tips_tied = 0, tips_removed = 0;  ///< Stick ends in the void (trim.h).
+  std::int64_t dangling = 0;                     ///< Those that are left.
   Pieces left;  ///< left.material.size() == 1 unless the model itself has pieces farther apart than the reach.
+  std::vector<Piece> unreached{};  ///< Still on too thin a neck: none, unless the model itself or keep_out forbids it.
 };
-/// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. At most three
-/// rounds.
+/// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. Loose pieces
+/// first, then thin necks, a few rounds each. Cost: as pieces() and unreached(), and a realize per round that finds
+/// something.
 [[nodiscard]] Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
                        const Context& context = {});
 /// What crosses a gap: grown into both its ends by half its diameter.
 [[nodiscard]] Capsule strut(const Gap& gap, double strut_mm);
+
+/// `before`, changed to `solid` and made one piece again; what was done adds up.
+[[nodiscard]] Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
+                             const Context& context = {});
 
 }  // namespace fibrolite

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fibrolite/reach.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "components.h"
+#include "fibrolite/disjoint_sets.h"
+#include "nearest_way.h"
+
+namespace fibrolite {
+namespace {
+
+using openvdb::Coord;
+using Leaf = Components::Leaf;
+using Id = Components::Id;
+
+/// Of the components inside, which hold a sample where the anchor is negative. Sorted by id.
+struct Anchored {
+  std::vector<Id> ids;
+  std::vector<bool> reached;
+
+  [[nodiscard]] std::size_t slot(Id id) const {  // ids.size(): none of them
+    const auto at = std::lower_bound(ids.begin(), ids.end(), id);
+    return at != ids.end() && *at == id ? static_cast<std::size_t>(at - ids.begin()) : ids.size();
+  }
+};
+
+Anchored find_anchored(const Components& components, const std::vector<Components::Component>& list,
+                       const Shape& anchor, double voxel_mm) {
+  Anchored found;
+  for (const auto& c : list)
+    if (c.inside) found.ids.push_back(c.id);
+  std::sort(found.ids.begin(), found.ids.end());
+  found.reached.assign(found.ids.size(), false);
+  const std::size_t none = found.ids.size();
+  components.each_block([&](const Coord& origin, const LeafLabels* labels, Id offset) {
+    // Most blocks hold nothing but what is known to be reached: no need to ask for the anchor there.
+    const std::size_t kinds = labels != nullptr ? labels->voxels.size() : 1;
+    std::vector<std::size_t> open(kinds, none);
+    bool any = false;
+    for (std::size_t k = 0; k < kinds; ++k) {
+      open[k] = found.slot(components.find(offset + static_cast<Id>(k)));
+      any = any || (open[k] < none && !found.reached[open[k]]);
+    }
+    if (!any) return;
+    std::array<float, Leaf::SIZE> x, y, z, value;
+    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+      const Vec3f p = to_float(world_mm(origin + Leaf::offsetToLocalCoord(i), voxel_mm));
+      x[i] = p.x, y[i] = p.y, z[i] = p.z;
+    }
+    const Vec3i leaf{origin.x(), origin.y(), origin.z()};
+    anchor.evaluate({x.data(), y.data(), z.data(), Leaf::SIZE, &leaf, voxel_mm}, value.data());
+    for (std::size_t i = 0; i < Leaf::SIZE; ++i) {
+      const std::size_t slot = open[labels != nullptr ? labels->label[i] : 0];
+      if (slot < none && value[i] < 0) found.reached[slot] = true;
+    }
+  });
+  return found;
+}
+
+/// Whether samples are as deep as asked for, by their values or, where those may understate it, by the distance to
+/// where the lattice's edges cross the surface.
+class Depth {
+ public:
+  Depth(const Solid& solid, double depth_mm)
+      : access_(solid.impl().grid->tree()),
+        depth_mm_(static_cast<float>(depth_mm)),
+        depth_vox_(depth_mm / solid.grid().voxel_mm),
+        reach_(static_cast<int>(std::ceil(depth_vox_))) {}
+
+  [[nodiscard]] bool inside(const Coord& at) { return access_.getValue(at) < 0; }
+  [[nodiscard]] bool deep(const Coord& at) {
+    const float value = access_.getValue(at);
+    if (value < -depth_mm_ || value >= 0) return value < 0;
+    for (int x = -reach_ - 1; x <= reach_; ++x) {
+      for (int y = -reach_ - 1; y <= reach_; ++y) {
+        for (int z = -reach_ - 1; z <= reach_; ++z)
+          if (crossed(at, {x, y, z})) return false;
+      }
+    }
+    return true;
+  }
+
+ private:
+  /// Does one of the three edges that start at a sample cross the surface within the depth?
+  [[nodiscard]] bool crossed(const Coord& at, const std::array<int, 3>& from) {
+    const float a = access_.getValue(at.offsetBy(from[0], from[1], from[2]));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::array<int, 3> to = from;
+      ++to[axis];
+      const float b = access_.getValue(at.offsetBy(to[0], to[1], to[2]));
+      if ((a < 0) == (b < 0)) continue;
+      double square = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double d = from[k] + (k == axis ? static_cast<double>(a) / (a - b) : 0);
+        square += d * d;
+      }
+      if (square < depth_vox_ * depth_vox_) return true;
+    }
+    return false;
+  }
+
+  openvdb::FloatGrid::ConstUnsafeAccessor access_;
+  float depth_mm_;
+  double depth_vox_;
+  int reach_;
+};
+
+/// Components that the values leave unreached, each grown by the samples around it that are deep all the same. Those
+/// that meet are one; those that meet what is reached, or the anchor, are reached. Set 0 is what is reached.
+class Regrown {
+ public:
+  Regrown(const Components& components, const Anchored& anchored, Depth& depth)
+      : components_(components), anchored_(anchored), depth_(depth), sets_(1) {}
+
+  void grow(const std::vector<Components::Component>& unreached, const Shape& anchor, double voxel_mm,
+            const Context& context) {
+    sets_ = DisjointSets(unreached.size() + 1);
+    samples_.resize(unreached.size());
+    for (std::size_t i = 0; i < unreached.size(); ++i) {
+      context.check();
+      flood(unreached[i], static_cast<std::uint32_t>(i + 1));
+    }
+    std::vector<Vec3d> points;
+    std::vector<float> value;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      points.clear();
+      for (const Coord& at : samples_[i]) points.push_back(world_mm(at, voxel_mm));
+      value.resize(points.size());
+      anchor.evaluate(points, value);
+      if (std::any_of(value.begin(), value.end(), [](float v) { return v < 0; }))
+        sets_.join(0, static_cast<std::uint32_t>(i + 1));
+    }
+  }
+
+  [[nodiscard]] std::uint32_t set_of(std::size_t i) { return sets_.root(static_cast<std::uint32_t>(i + 1)); }
+  [[nodiscard]] const std::vector<Coord>& samples(std::size_t i) const { return samples_[i]; }
+  /// The set that a sample belongs to: 0 is reached, -1 is none.
+  [[nodiscard]] std::int64_t at(const Coord& at) {
+    if (const std::int32_t mine = owner_.getValue(at); mine > 0) return sets_.root(static_cast<std::uint32_t>(mine));
+    const std::size_t slot = anchored_.slot(components_.at(at));
+    return slot < anchored_.ids.size() && anchored_.reached[slot] ? 0 : -1;
+  }
+  void reach(std::uint32_t set) { sets_.join(0, set); }
+
+ private:
+  void flood(const Components::Component& from, std::uint32_t mine) {
+    std::vector<Coord>& stack = samples_[mine - 1];  // of which the first `done` have been looked around from
+    if (const std::int32_t taken = owner_.getValue(from.first); taken > 0) {
+      sets_.join(static_cast<std::uint32_t>(taken), mine);
+      return;
+    }
+    stack.push_back(from.first);
+    owner_.setValue(from.first, static_cast<std::int32_t>(mine));
+    for (std::size_t done = 0; done < stack.size(); ++done) {
+      for (const auto& s : face_steps) {
+        const Coord to = stack[done].offsetBy(s[0], s[1], s[2]);
+        if (const std::int32_t taken = owner_.getValue(to); taken > 0) {
+          sets_.join(static_cast<std::uint32_t>(taken), mine);
+          continue;
+        }
+        if (!depth_.deep(to)) continue;
+        if (const std::size_t slot = anchored_.slot(components_.at(to));
+            slot < anchored_.ids.size() && anchored_.reached[slot]) {
+          sets_.join(0, mine);
+          continue;
+        }
+        owner_.setValue(to, static_cast<std::int32_t>(mine));
+        stack.push_back(to);
+      }
+    }
+  }
+
+  const Components& components_;
+  const Anchored& anchored_;
+  Depth& depth_;
+  DisjointSets sets_;
+  std::vector<std::vector<Coord>> samples_;
+  openvdb::Int32Tree owner_{0};
+};
+
+}  // namespace
+
+double skin_mm(double neck_mm, Grid grid) {
+  return std::clamp(0.5 * neck_mm - grid.voxel_mm, 0.0, (grid.band_vox - 0.5) * grid.voxel_mm);
+}
+
+std::vector<Unreached> unreached(const Solid& solid, const Shape& anchor, const ReachParams& params,
+                                 const Context& context) {
+  const Grid grid = solid.grid();
+  const double voxel = grid.voxel_mm;
+  const double depth_mm = skin_mm(params.neck_mm, grid);
+  const Components components(solid, context, -static_cast<float>(depth_mm));
+  if (components.empty()) return {};
+  auto list = components.list();
+  const Anchored anchored = find_anchored(components, list, anchor, voxel);
+  std::erase_if(list, [&](const auto& c) { return !c.inside || anchored.reached[anchored.slot(c.id)]; });
+  if (list.empty()) return {};
+
+  std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.voxels > b.voxels; });
+  Depth depth(solid, depth_mm);
+  Regrown regrown(components, anchored, depth);
+  regrown.grow(list, anchor, voxel, context);
+
+  std::vector<Unreached> found;
+  std::vector<std::vector<Coord>> samples;
+  std::vector<std::uint32_t> set;
+  std::vector<std::size_t> number(list.size() + 1, list.size());  // of each set, among those found
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const std::uint32_t mine = regrown.set_of(i);
+    if (mine == 0) continue;
+    if (number[mine] == list.size()) {
+      number[mine] = found.size();
+      set.push_back(mine);
+      samples.emplace_back();
+      found.push_back({.piece = {0, 0, world_mm(list[i].first, voxel)}});
+    }
+    std::vector<Coord>& all = samples[number[mine]];
+    all.insert(all.end(), regrown.samples(i).begin(), regrown.samples(i).end());
+  }
+  for (std::size_t n = 0; n < found.size(); ++n) {
+    Piece& piece = found[n].piece;
+    piece.voxels = static_cast<std::int64_t>(samples[n].size());
+    piece.volume_mm3 = static_cast<double>(piece.voxels) * voxel * voxel * voxel;
+  }
+
+  for (std::size_t n = 0; n < found.size() && params.way_mm > 0; ++n) {
+    context.check();
+    const std::vector<Coord>& sources = samples[n];
+    const auto clear = [&](const SampleWay& way) {
+      const Vec3d a = world_mm(way.from, voxel), b = world_mm(way.to, voxel);
+      const int steps = 1 + static_cast<int>(norm(b - a) / voxel);
+      for (int k = 0; k <= steps; ++k)
+        if (params.keep_out(a + (1.0 * k / steps) * (b - a)) < 0.5 * params.neck_mm) return false;
+      return true;
+    };
+    const auto look = [&](const auto& passable) {
+      openvdb::MaskTree seen;
+      for (const Coord& at : sources) seen.setValueOn(at);
+      return nearest_way(sources, seen, params.way_mm / voxel, passable,
+                         [&](const SampleWay& way) { return regrown.at(way.to) == 0 && clear(way); });
+    };
+    auto way = look([&](const Coord& at) { return depth.inside(at); });
+    if (!way) way = look([](const Coord&) { return true; });
+    if (!way) continue;
+    found[n].way = Gap{world_mm(way->from, voxel), world_mm(way->to, voxel)};
+    regrown.reach(set[n]);  // the next may hang on this one
+  }
+  return found;
+}
+
+}  // namespace fibrolite

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "fibrolite/reach.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fibrolite/realize.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr Grid grid{.voxel_mm = 0.25};
+Solid make(const Shape& shape) { return realize(shape, Box3d{{-12, -12, -12}, {12, 12, 12}}, grid); }
+
+/// Two blocks on a bar that is thick, thin, or thick again at the other end: only what hangs on the thin one is
+/// unreached.
+TEST(Unreached, finds_what_hangs_on_a_thin_neck) {
+  const Shape anchor = cuboid({{-10, -4, -4}, {-6, 4, 4}}), block = cuboid({{4, -2, -2}, {8, 2, 2}});
+  const auto bar = [](double radius) { return cylinder({-7, 0.1, 0.1}, {5, 0.1, 0.1}, radius); };
+  const auto found = [&](double radius, double neck) {
+    return unreached(make(unite({anchor, block, bar(radius)})), anchor, {.neck_mm = neck});
+  };
+  EXPECT_EQ(found(0.6, 1.2).size(), 0U);  // as thick as asked for
+  EXPECT_EQ(found(0.4, 0.8).size(), 0U);
+  EXPECT_EQ(found(0.4, 1.0).size(), 0U);  // within two voxels
+  const auto thin = found(0.3, 1.4);
+  ASSERT_EQ(thin.size(), 1U);
+  const double depth = 0.7 - 0.25, side = 4 - 2 * depth;
+  EXPECT_NEAR(thin[0].piece.volume_mm3 / (side * side * side), 1, 0.2);
+  EXPECT_NEAR(thin[0].piece.sample_mm.x, 4 + depth, 0.3);
+  EXPECT_EQ(unreached(make(unite({anchor, block})), anchor, {.neck_mm = 0.8}).size(), 1U);  // not joined at all
+  EXPECT_EQ(unreached(make(unite({anchor, block})), nothing(), {.neck_mm = 0.8}).size(), 2U);
+  EXPECT_EQ(unreached(make(unite({anchor, block})), everything(), {.neck_mm = 0.8}).size(), 0U);
+}
+
+/// A bar of 1.2 mm made of two halves that touch: the values of their union are 0 in its middle, and at most 0.3 mm
+/// deep in all of it, though it is 0.6 mm deep. Its depth is measured from its surface.
+TEST(Unreached, values_of_a_union_that_understate_its_depth_cut_nothing_off) {
+  const Shape anchor = cuboid({{-10, -4, -4}, {-6, 4, 4}}), block = cuboid({{4, -2, -2}, {8, 2, 2}});
+  const auto found = [&](double half, double neck) {
+    const Shape bar = unite({cuboid({{-7, 0.1 - half, 0.1 - half}, {5, 0.1, 0.1 + half}}),
+                             cuboid({{-7, 0.1, 0.1 - half}, {5, 0.1 + half, 0.1 + half}})});
+    return unreached(make(unite({anchor, block, bar})), anchor, {.neck_mm = neck}).size();
+  };
+  EXPECT_EQ(found(0.6, 1.2), 0U);
+  EXPECT_EQ(found(0.3, 1.4), 1U);  // thin, however it is made
+}
+
+TEST(Unreached, gives_the_way_through_the_neck_and_not_the_shorter_one_through_void) {
+  // An arm parallel to the anchor, 2 mm away from it, which hangs on a thin bar 6 mm long at its end.
+  const Shape anchor = cuboid({{-10, -10, -4}, {10, -6, 4}}), arm = cuboid({{-10, -4, -2}, {4, -1, 2}});
+  const Shape bar = cylinder({3, -2.4, 0.1}, {10, -2.4, 0.1}, 0.3), post = cuboid({{9, -7, -2}, {11, -1, 2}});
+  const Solid solid = make(unite({anchor, arm, bar, post}));
+  const auto found = unreached(solid, anchor, {.neck_mm = 1.4, .way_mm = 8});
+  ASSERT_EQ(found.size(), 1U);
+  ASSERT_TRUE(found[0].way);
+  EXPECT_NEAR(found[0].way->from_mm.x, 4 - 0.45, 0.3);
+  EXPECT_NEAR(found[0].way->to_mm.x, 9 + 0.45, 0.3);
+  EXPECT_FALSE(unreached(solid, anchor, {.neck_mm = 1.4, .way_mm = 1}).at(0).way);
+  // With something in the way it goes through void.
+  const auto around = unreached(solid, anchor, {.neck_mm = 1.4, .way_mm = 8, .keep_out = sphere({6.5, -2.4, 0.1}, 1)});
+  ASSERT_TRUE(around.at(0).way);
+  EXPECT_NEAR(around[0].way->to_mm.y, -6 - 0.45, 0.3);
+}
+
+TEST(Unreached, a_chain_is_told_link_by_link) {
+  const Shape anchor = cuboid({{-10, -4, -4}, {-6, 4, 4}});
+  const Shape first = cuboid({{-3, -2, -2}, {0, 2, 2}}), second = cuboid({{3, -1, -1}, {5, 1, 1}});
+  const Shape bar = cylinder({-7, 0.1, 0.1}, {4, 0.1, 0.1}, 0.3);
+  const auto found = unreached(make(unite({anchor, first, second, bar})), anchor, {.neck_mm = 1.4, .way_mm = 8});
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_NEAR(norm(found[0].way->to_mm - found[0].way->from_mm), 3 + 2 * 0.45, 0.5);
+  EXPECT_NEAR(norm(found[1].way->to_mm - found[1].way->from_mm), 3 + 2 * 0.45, 0.5);
+}
+
+}  // namespace
+}  // namespace fibrolite
