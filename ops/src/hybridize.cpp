@@ -51,10 +51,11 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
 
   // Interiors and joints (paper Sec. 5 and 6), as distance functions.
   const bool sections = params.infill == InfillKind::Hybrid || params.infill == InfillKind::Mfs;
-  const Shape model_distance = sections ? distance_to(WindingTree(model.mesh)) : Shape();
+  Shape model_distance;
   std::vector<Fill> fills;
   run("infill", 0.40, [&](const Context& c) {
-    const auto thickness = grading(model.mesh, recipe, stress_mpa, c);
+    if (sections || recipe.tcs.grade != TcsGrade::None) model_distance = distance_to(WindingTree(model.mesh));
+    const auto thickness = grading(bounds(model.mesh), model_distance, recipe, stress_mpa, c);
     for (const Part& p : out.parts.parts) fills.push_back(fill(p, params.infill, recipe, model_distance, thickness));
   });
   std::vector<double> demand_n;

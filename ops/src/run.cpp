@@ -57,20 +57,16 @@ PartInfill infill_of(const Part& part, InfillKind run) {
   return PartInfill::Solid;
 }
 
-std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const std::function<double(Vec3d)>& stress_mpa,
-                             const Context& context) {
+std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& recipe,
+                             const std::function<double(Vec3d)>& stress_mpa, const Context& context) {
   const TcsParams& tcs = recipe.tcs;
   if (tcs.grade == TcsGrade::None) return std::nullopt;
+  const double depth = tcs.grade_depth_mm, shell_mm = recipe.shell.thickness_mm;
   if (tcs.grade == TcsGrade::Stress) {
-    const StressGrade grade{.least = tcs.grade_least, .most = tcs.grade_most, .slope_mm = tcs.grade_depth_mm};
-    const Box3d box = bounds(mesh);
-    const Solid coarse = to_solid(mesh, {.grid = {.voxel_mm = box.longest_side() / 100}}, context).solid;
-    return thicker_where_stressed(grade, box, distance_to(coarse), stress_mpa, context);
+    const StressGrade grade{.least = tcs.grade_least, .most = tcs.grade_most, .slope_mm = depth};
+    return thicker_where_stressed(grade, box, body, stress_mpa, context);
   }
-  // Of its own, coarse voxel, so that the fine one changes nothing.
-  const double shell_mm = recipe.shell.thickness_mm, depth = recipe.tcs.grade_depth_mm;
-  const ToSolidParams coarse{.grid = {.voxel_mm = depth / 8}, .inside_band_mm = shell_mm + depth};
-  return thicker_at_surface(recipe.tcs, distance_to(to_solid(mesh, coarse, context).solid), shell_mm);
+  return thicker_at_surface(tcs, depth_table(body, box, depth / 6, context), shell_mm);
 }
 
 Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,

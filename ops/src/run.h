@@ -44,7 +44,7 @@ class Run {
 /// What a part gets in a run: in a hybrid by its kind, unless the user says otherwise.
 [[nodiscard]] PartInfill infill_of(const Part& part, InfillKind run);
 /// How much thicker the crystal is where (TcsParams::grade); none if it is not graded. `stress_mpa`: of a hybrid.
-[[nodiscard]] std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe,
+[[nodiscard]] std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& recipe,
                                            const std::function<double(Vec3d)>& stress_mpa, const Context& context);
 [[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
                         const std::optional<Shape>& thickness);
