@@ -104,7 +104,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   if (params.function) {
     const Shape smooth =
         compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, recipe, assembly);
-    out.printed = as_function(smooth, body, mended);
+    out.printed = as_function(smooth, body, mended, context);
   }
   if (params.steps) out.steps = steps(body, raw, out, fills, mended, assembly);
   return out;

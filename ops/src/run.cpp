@@ -185,7 +185,7 @@ struct Retouched final : Shape::Function {
 
 }  // namespace
 
-Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
+Shape as_function(const Shape& whole, const Solid& body, const Mended& mended, const Context& context) {
   const Shape b = distance_to(body), solid = distance_to(mended.tied.solid);
   const Shape made = with_mends(whole, b, mended);
 
@@ -198,6 +198,7 @@ Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
   const std::vector<Vec3i> origins = blocks(body);
   std::vector<Differing> differing(origins.size());
   for_each_block(origins, voxel, [&](std::size_t number, const PointBlock& block) {
+    context.check();
     std::array<float, PointBlock::capacity> f, s;
     made.evaluate(block, f.data());
     solid.evaluate(block, s.data());

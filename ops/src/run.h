@@ -77,7 +77,7 @@ struct Design {
                             const AssembleParams& params);
 /// The printed solid as a function: the composed shape with its ties and mends, put right wherever a sample of the
 /// solid says otherwise (specks that went, pores that were filled).
-[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made);
+[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made, const Context& context);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
                                         const Recipe& recipe, bool fix, Report& report, const Context& context);

@@ -63,6 +63,7 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
   report.model.repairs = prepared.repairs;
   report.warnings = prepared.warnings;
   filled->shape = hybridize(prepared, fill, report, context.part(0.05, 1, "fill")).printed;
+  context.check();
   context.progress(1);
   filled_ = std::move(filled);
 }
