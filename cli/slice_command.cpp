@@ -51,9 +51,6 @@ struct Source {
   double volume_mm3 = 0;
 };
 
-/// Layers lie across `up`.
-Frame print_frame(Up up) { return up == Up::Z ? Frame{} : frame_along({}, direction(up)); }
-
 Box3d bounds_in(const Frame& frame, const Mesh& mesh) {
   Box3d box;
   for (const Vec3f& v : mesh.vertices) box.include(frame.to_local(to_double(v)));
@@ -201,7 +198,7 @@ void slice_to_files(const SliceOptions& options) {
   Report& report = job.report;
   Stopwatch stage(report.stages);
 
-  const Frame frame = print_frame(options.model.up);
+  const Frame frame = upright(options.model.up);
   Source source;
   Model model;
   if (options.from_solid()) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -50,6 +51,7 @@ Run measure(const Case& c, const Options& options) {
                                    c.preset,
                                    "--overwrite",
                                    "--quiet"};
+  for (const std::string& key : c.set) command.insert(command.end(), {"--set", key});
   if (options.threads > 0) command.insert(command.end(), {"--threads", std::to_string(options.threads)});
   Run run;
   run.program = fibrolite::bench::run(command, log);
@@ -84,10 +86,16 @@ int bench(const Options& options) {
   nlohmann::json json{
       {"cores", std::thread::hardware_concurrency()}, {"threads", options.threads}, {"cases", nlohmann::json::array()}};
   int failed = 0;
+  std::map<std::string, Run> done;
   print_head();
   for (const Case& c : suite(options.suite)) {
     if (!options.only.empty() && c.name.find(options.only) == std::string::npos) continue;
-    const Run run = median(c, options);
+    Run run = median(c, options);
+    if (const auto found = done.find(c.beside); found != done.end()) {
+      run.beside_cpu_s = found->second.compute_cpu_s;
+      run.beside_realize = found->second.realize_per_voxel();
+    }
+    if (run.failure.empty()) done.emplace(c.name, run);
     failed += run.failure.empty() ? 0 : 1;
     print_row(c, run);
     json["cases"].push_back(to_json(c, run));

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <stdexcept>
+#include <utility>
 
 namespace fibrolite::bench {
 namespace {
@@ -24,6 +26,33 @@ std::string label(double mm) {
   std::string text = std::to_string(mm);
   text.erase(text.find_last_not_of('0') + 1);
   return text;
+}
+
+/// What the parts of the method may cost, each beside the run without it.
+std::vector<Case> costs(const std::filesystem::path& main_model, const SuiteParams& params) {
+  const Case horse{.name = "", .model = main_model, .repeats = 3, .goals = {}};
+  const auto made = [](Case c, const char* name, std::vector<std::string> set, const char* beside, Goals goals) {
+    c.name = name;
+    c.set = std::move(set);
+    c.beside = beside;
+    c.goals = goals;
+    return c;
+  };
+  Case crystal = horse, bend = horse;
+  crystal.infill = "tcs";
+  bend.model = params.assets / "bent_tube.ply";
+  bend.size_mm = 60;
+  bend.voxel_mm = 0.1;
+  bend.repeats = 1;
+  const Goals graded{.cpu_times = 1.2}, swept{.realize_times = 3};
+  const char* crystal_inside = R"(partition.overrides={"parts":[{"id":0,"infill":"tcs"}]})";
+  return {made(horse, "cost hybrid", {}, "", {.joints_share = 0.1}),
+          made(horse, "cost stress", {"tcs.grade=\"stress\""}, "cost hybrid", graded),
+          made(crystal, "cost tcs", {}, "", {}),
+          made(crystal, "cost surface", {"tcs.grade=\"surface\""}, "cost tcs", graded),
+          made(bend, "cost bend tcs", {crystal_inside}, "", {}),
+          made(bend, "cost bend mfs", {}, "cost bend tcs", swept),
+          made(bend, "cost bend taper", {"mfs.taper=true"}, "cost bend tcs", swept)};
 }
 
 }  // namespace
@@ -59,7 +88,8 @@ std::vector<Case> suite(const SuiteParams& params) {
                    .model = main_model,
                    .size_mm = 300,
                    .voxel_mm = 0.4,
-                   .goals = {.floor_ratio = {}, .wall_s = 90, .partition_s = 30, .peak_rss_mb = {}}});
+                   .goals = {.wall_s = 90, .partition_s = 30}});
+  std::ranges::move(costs(main_model, params), std::back_inserter(cases));
   for (const char* infill : {"tcs", "mfs", "solid"}) {
     cases.push_back({.name = infill, .model = main_model, .voxel_mm = 0.25, .infill = infill, .goals = {}});
   }

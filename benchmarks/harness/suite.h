@@ -11,10 +11,14 @@ namespace fibrolite::bench {
 
 /// Upper bounds; none: only reported.
 struct Goals {
-  std::optional<double> floor_ratio;  ///< Compute stages over the floor's.
-  std::optional<double> wall_s;       ///< Of the whole process.
-  std::optional<double> partition_s;  ///< Everything that decides the parts, verification included.
-  std::optional<double> peak_rss_mb;
+  std::optional<double> floor_ratio{};  ///< Compute stages over the floor's.
+  std::optional<double> wall_s{};       ///< Of the whole process.
+  std::optional<double> partition_s{};  ///< Everything that decides the parts, verification included.
+  std::optional<double> peak_rss_mb{};
+  std::optional<double> joints_share{};  ///< Of the CPU time of all stages.
+  // Beside the case named Case::beside, in the same suite:
+  std::optional<double> cpu_times{};      ///< CPU time of the compute stages.
+  std::optional<double> realize_times{};  ///< CPU time of `realize` per active voxel.
 };
 struct Case {
   std::string name;
@@ -24,6 +28,8 @@ struct Case {
   std::string infill = "hybrid", preset = "default";
   int repeats = 1;  ///< The median is reported.
   Goals goals;
+  std::vector<std::string> set{};  ///< Recipe keys, as `--set` takes them.
+  std::string beside{};            ///< An earlier case to compare with.
 };
 struct SuiteParams {
   std::filesystem::path assets;                 ///< Bundled models, .ply.

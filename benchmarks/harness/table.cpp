@@ -34,7 +34,11 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
                           .cpu_s = stage.value("cpu_s", 0.0),
                           .peak_rss_mb = stage.at("peak_rss_mb")});
   }
+  double all_cpu_s = 0, joints_cpu_s = 0;
   for (const Stage& stage : run.stages) {
+    all_cpu_s += stage.cpu_s;
+    if (stage.name == "joints") joints_cpu_s += stage.cpu_s;
+    if (stage.name == "realize") run.realize_cpu_s += stage.cpu_s;
     if (moves_files(stage.name)) {
       run.files_s += stage.wall_s;
       continue;
@@ -43,6 +47,7 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
     run.compute_cpu_s += stage.cpu_s;
     if (decides_parts(stage.name)) run.partition_s += stage.wall_s;
   }
+  run.joints_share = joints_cpu_s / all_cpu_s;
   run.active_voxels = report.at("solid").at("active_voxels");
   run.triangles = report.at("mesh").at("triangles");
   run.floor_compute_s = floor.at("compute_s");
@@ -81,13 +86,19 @@ std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
     if (!bound) return;
     const bool ok = run.failure.empty() && value <= *bound;
     met = met && ok;
-    verdicts.push_back(std::string(what) + " " + number(value, 2) + " of at most " + number(*bound, 0) +
-                       (ok ? ": ok" : ": missed"));
+    verdicts.push_back(std::string(what) + " " + number(value, 2) + " of at most " +
+                       number(*bound, *bound < 10 ? 1 : 0) + (ok ? ": ok" : ": missed"));
   };
   one("compute / floor", c.goals.floor_ratio, run.compute_ratio());
   one("wall s", c.goals.wall_s, run.program.wall_s);
   one("partition and verification s", c.goals.partition_s, run.partition_s);
   one("peak MB", c.goals.peak_rss_mb, run.program.peak_rss_mb);
+  one("joints / all stages, CPU", c.goals.joints_share, run.joints_share);
+  if (run.beside_cpu_s > 0) {
+    const std::string over = " / " + c.beside;
+    one(("compute CPU" + over).c_str(), c.goals.cpu_times, run.compute_cpu_s / run.beside_cpu_s);
+    one(("realize CPU per voxel" + over).c_str(), c.goals.realize_times, run.realize_per_voxel() / run.beside_realize);
+  }
   return verdicts;
 }
 
@@ -95,7 +106,8 @@ nlohmann::json to_json(const Case& c, const Run& run) {
   nlohmann::json json{{"name", c.name},       {"model", c.model.filename().string()},
                       {"size_mm", c.size_mm}, {"voxel_mm", c.voxel_mm},
                       {"infill", c.infill},   {"preset", c.preset},
-                      {"repeats", c.repeats}};
+                      {"repeats", c.repeats}, {"set", c.set},
+                      {"beside", c.beside}};
   if (!run.failure.empty()) {
     json["failure"] = run.failure;
     return json;
@@ -112,6 +124,8 @@ nlohmann::json to_json(const Case& c, const Run& run) {
   json["compute_cpu_s"] = run.compute_cpu_s;
   json["files_s"] = run.files_s;
   json["partition_s"] = run.partition_s;
+  json["joints_share"] = run.joints_share;
+  json["realize_cpu_s"] = run.realize_cpu_s;
   json["active_voxels"] = run.active_voxels;
   json["triangles"] = run.triangles;
   json["floor"] = {{"wall_s", run.floor.wall_s},

@@ -37,6 +37,10 @@ double inside_share(const std::array<float, 4>& v, float centre) {
   return 0.25 * sum;
 }
 
+CellRange common(const CellRange& a, const CellRange& b) {
+  return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
+}
+
 /// Adds the inside shares of a block's cells.
 void add_shares(const CellBlock& block, const CellRange& cells, double weight,
                 std::array<float, block_cells * block_cells>& share) {
@@ -69,42 +73,70 @@ SliceGrid slice_grid(const Frame& frame, const Box3d& box, Vec2d pixel_mm, doubl
   return grid;
 }
 
-Slice slice(const Shape& shape, const SliceGrid& grid, int layer, const SliceParams& params) {
+void check(const SliceParams& params) {
   if (params.planes < 1 || params.planes > 16) throw Error(Code::BadRecipe, "planes of a layer are 1 to 16", "planes");
+}
+
+double slice_into(std::uint8_t* rows, std::ptrdiff_t stride, const PixelRange& tile, const Shape& shape,
+                  const SliceGrid& grid, int layer, const SliceParams& params, const Context& context) {
+  check(params);
   if (!is_length(grid.pixel_mm.x) || !is_length(grid.pixel_mm.y) || !is_length(grid.layer_mm) || grid.width < 1 ||
       grid.height < 1)
     throw Error(Code::BadRecipe, "a layer needs pixels, and positive lengths for them and its height", "slice");
-  Slice out{GrayImage(grid.width, grid.height), 0};
+  if (tile.x < 0 || tile.y < 0 || tile.width < 1 || tile.height < 1 || tile.width > grid.width - tile.x ||
+      tile.height > grid.height - tile.y)
+    throw Error(Code::BadRecipe, "a tile must hold pixels, and of the layer only", "tile");
+  if (stride < tile.width) throw Error(Code::BadRecipe, "rows overlap", "stride", "use the tile's width or more");
   const auto plane_mm = [&](int p) { return (layer + (p + 0.5) / params.planes) * grid.layer_mm; };
   const double weight = 1.0 / params.planes;
+  const CellRange wanted{tile.x, tile.y, tile.x + tile.width, tile.y + tile.height};
+  const auto row_of = [&](int x, int y) { return rows + (y - tile.y) * stride + (x - tile.x); };
 
+  // The layer's own squares and blocks, cut off at the tile's rim: what is in a pixel does not depend on the tile.
+  const int across = squares_across(grid);
+  const int x0 = wanted.x0 / square_cells, x1 = (wanted.x1 - 1) / square_cells;
+  const int y0 = wanted.y0 / square_cells, y1 = (wanted.y1 - 1) / square_cells;
+  const int wide = x1 - x0 + 1, squares = wide * (y1 - y0 + 1);
   // One number per square, summed in order: the same bits on any number of threads.
-  const int squares = squares_across(grid) * squares_up(grid);
   std::vector<double> filled(static_cast<std::size_t>(squares), 0.0);
   tbb::parallel_for(0, squares, [&](int number) {
+    context.check();
     double& sum = filled[static_cast<std::size_t>(number)];
+    const CellRange whole = square(grid, (y0 + number / wide) * across + x0 + number % wide);
+    const CellRange empty = common(whole, wanted);
+    for (int y = empty.y0; y < empty.y1; ++y) std::fill_n(row_of(empty.x0, y), empty.x1 - empty.x0, std::uint8_t{0});
     const auto full = [&](const CellRange& cells) {
-      for (int y = cells.y0; y < cells.y1; ++y)
-        std::fill(&out.coverage(cells.x0, y), &out.coverage(cells.x0, y) + (cells.x1 - cells.x0), std::uint8_t{255});
-      sum += static_cast<double>(cells.x1 - cells.x0) * (cells.y1 - cells.y0);
+      const CellRange c = common(cells, wanted);
+      if (c.x0 >= c.x1 || c.y0 >= c.y1) return;
+      for (int y = c.y0; y < c.y1; ++y) std::fill_n(row_of(c.x0, y), c.x1 - c.x0, std::uint8_t{255});
+      sum += static_cast<double>(c.x1 - c.x0) * (c.y1 - c.y0);
     };
     const auto mixed = [&](const CellRange& cells) {
+      const CellRange c = common(cells, wanted);
+      if (c.x0 >= c.x1 || c.y0 >= c.y1) return;
       std::array<float, block_cells * block_cells> share{};
       for (int p = 0; p < params.planes; ++p)
         add_shares(CellBlock(shape, grid, cells, plane_mm(p)), cells, weight, share);
 
-      for (int y = cells.y0; y < cells.y1; ++y) {
-        for (int x = cells.x0; x < cells.x1; ++x) {
+      for (int y = c.y0; y < c.y1; ++y) {
+        for (int x = c.x0; x < c.x1; ++x) {
           const float s = share[static_cast<std::size_t>((y - cells.y0) * block_cells + x - cells.x0)];
-          out.coverage(x, y) = static_cast<std::uint8_t>(std::min(255.0F, 255.0F * s + 0.5F));
+          *row_of(x, y) = static_cast<std::uint8_t>(std::min(255.0F, 255.0F * s + 0.5F));
           sum += s;
         }
       }
     };
-    visit_cells(shape, grid, square(grid, number), plane_mm(0), plane_mm(params.planes - 1), full, mixed);
+    visit_cells(shape, grid, whole, plane_mm(0), plane_mm(params.planes - 1), full, mixed);
   });
-  for (const double s : filled) out.area_mm2 += s;
-  out.area_mm2 *= grid.pixel_mm.x * grid.pixel_mm.y;
+  double pixels = 0;
+  for (const double s : filled) pixels += s;
+  return pixels * grid.pixel_mm.x * grid.pixel_mm.y;
+}
+
+Slice slice(const Shape& shape, const SliceGrid& grid, int layer, const SliceParams& params) {
+  Slice out{GrayImage(std::max(0, grid.width), std::max(0, grid.height)), 0};
+  out.area_mm2 =
+      slice_into(out.coverage.pixels.data(), grid.width, {0, 0, grid.width, grid.height}, shape, grid, layer, params);
   return out;
 }
 

@@ -35,18 +35,21 @@ struct Table final : Shape::Function {
     return origin + step * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
   }
   void evaluate(const PointBlock& block, float* out) const override {
+    const Vec3f from = to_float(origin);
+    const std::array<float, 3> first{from.x, from.y, from.z};
+    const std::array<const float*, 3> place{block.x, block.y, block.z};
+    const auto per_mm = static_cast<float>(1 / step);
     for (int n = 0; n < block.count; ++n) {
-      const std::array<double, 3> p{block.x[n] - origin.x, block.y[n] - origin.y, block.z[n] - origin.z};
       std::array<int, 3> cell{};
       std::array<float, 3> w{};
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double s = std::clamp(p[axis] / step, 0.0, static_cast<double>(size[axis] - 1));
+        const float s = std::clamp((place[axis][n] - first[axis]) * per_mm, 0.0F, static_cast<float>(size[axis] - 1));
         cell[axis] = std::min(static_cast<int>(s), size[axis] - 2);
-        w[axis] = static_cast<float>(s - cell[axis]);
+        w[axis] = s - static_cast<float>(cell[axis]);
       }
       const auto along_x = [&](int j, int k) {
-        const std::size_t first = at(cell[0], cell[1] + j, cell[2] + k);
-        return value[first] + w[0] * (value[first + 1] - value[first]);
+        const float* low = value.data() + at(cell[0], cell[1] + j, cell[2] + k);
+        return low[0] + w[0] * (low[1] - low[0]);
       };
       const float low = along_x(0, 0) + w[1] * (along_x(1, 0) - along_x(0, 0));
       const float high = along_x(0, 1) + w[1] * (along_x(1, 1) - along_x(0, 1));
@@ -55,6 +58,17 @@ struct Table final : Shape::Function {
   }
   [[nodiscard]] double lipschitz() const override { return steepest; }
 };
+
+std::shared_ptr<Table> table_over(const Box3d& box, double step_mm) {
+  auto table = std::make_shared<Table>();
+  const Vec3d size = box.size();
+  table->step = std::max(step_mm, std::cbrt(size.x * size.y * size.z / most_entries));
+  table->origin = box.min;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    table->size[axis] = 2 + static_cast<int>(size[static_cast<int>(axis)] / table->step);
+  table->value.assign(table->at(0, 0, table->size[2]), 0);
+  return table;
+}
 
 /// Each value at least that of its neighbours less what the way to them allows: once up and once down the lattice.
 void limit_slope(Table& table, double per_mm) {
@@ -93,14 +107,7 @@ void check(const StressGrade& grade) {
 Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const Shape& body,
                              const std::function<double(Vec3d)>& stress_mpa, const Context& context) {
   check(grade);
-  auto table = std::make_shared<Table>();
-  const Vec3d size = box.size();
-  table->step = std::max(grade.slope_mm / 4, std::cbrt(size.x * size.y * size.z / most_entries));
-  table->origin = box.min;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    table->size[axis] = 2 + static_cast<int>(size[static_cast<int>(axis)] / table->step);
-  const auto [nx, ny, nz] = table->size;
-  table->value.assign(table->at(0, 0, nz), 0);
+  const auto table = table_over(box, grade.slope_mm / 4);
   std::vector<float> depth(table->value.size());
   tbb::parallel_for(0, table->size[2], [&](int k) {
     context.check();
@@ -132,6 +139,28 @@ Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const S
   limit_slope(*table, span / grade.slope_mm);
   table->steepest = std::sqrt(3.0) * span / grade.slope_mm;
   return Shape(std::move(table));
+}
+
+Shape depth_table(const Shape& body, const Box3d& box, double step_mm, const Context& context) {
+  constexpr int edge = 4;  // entries of a neighbourhood
+  const auto table = table_over(box, step_mm);
+  table->steepest = std::sqrt(3.0);
+  const auto [nx, ny, nz] = table->size;
+  const auto fill = [&](int i0, int j0, int k0) {
+    const int i1 = std::min(i0 + edge, nx), j1 = std::min(j0 + edge, ny), k1 = std::min(k0 + edge, nz);
+    const Vec3d low = table->place(i0, j0, k0), high = table->place(i1 - 1, j1 - 1, k1 - 1);
+    const double outside = body(0.5 * (low + high)) - 0.5 * norm(high - low);
+    for (int k = k0; k < k1; ++k)
+      for (int j = j0; j < j1; ++j)
+        for (int i = i0; i < i1; ++i)
+          table->value[table->at(i, j, k)] = outside > 0 ? static_cast<float>(outside) : body(table->place(i, j, k));
+  };
+  tbb::parallel_for(0, (nz + edge - 1) / edge, [&](int slab) {
+    context.check();
+    for (int j = 0; j < ny; j += edge)
+      for (int i = 0; i < nx; i += edge) fill(i, j, slab * edge);
+  });
+  return Shape(table);
 }
 
 }  // namespace fibrolite

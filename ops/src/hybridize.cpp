@@ -52,10 +52,11 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
 
   // Interiors and joints (paper Sec. 5 and 6), as distance functions.
   const bool sections = params.infill == InfillKind::Hybrid || params.infill == InfillKind::Mfs;
-  const Shape model_distance = sections ? distance_to(WindingTree(model.mesh)) : Shape();
+  Shape model_distance;
   std::vector<Fill> fills;
   run("infill", 0.40, [&](const Context& c) {
-    const auto thickness = grading(model.mesh, recipe, stress_mpa, c);
+    if (sections || recipe.tcs.grade != TcsGrade::None) model_distance = distance_to(WindingTree(model.mesh));
+    const auto thickness = grading(bounds(model.mesh), model_distance, recipe, stress_mpa, c);
     for (const Part& p : out.parts.parts) fills.push_back(fill(p, params.infill, recipe, model_distance, thickness));
   });
   std::vector<double> demand_n;
@@ -106,7 +107,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   if (params.function) {
     const Shape smooth =
         compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, recipe, assembly);
-    out.printed = as_function(smooth, body, mended);
+    out.printed = as_function(smooth, body, mended, context);
   }
   if (params.steps) out.steps = steps(body, raw, out, fills, mended, assembly);
   return out;

@@ -114,7 +114,7 @@ Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b,
                                    std::string_view name) {
     const Face face = face_of(layer, frame, fill, lumen, params.layer_mm);
     const double touching = contact_area_mm2(layer, face);
-    if (!is_crystal) return touching;
+    if (!is_crystal || !params.columns) return touching;
     const Random own(seed, name, static_cast<std::uint64_t>(index));
     SupportColumns found = support_columns(layer, frame, fill, face, stick_mm, lumen, params, own, context);
     joint.columns.insert(joint.columns.end(), found.columns.begin(), found.columns.end());

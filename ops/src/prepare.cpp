@@ -184,6 +184,8 @@ Vec3d direction(Up up) {
   return {0, 0, -1};
 }
 
+Frame upright(Up up) { return up == Up::Z ? Frame{} : frame_along({}, direction(up)); }
+
 Model prepare(const MeshFile& file, const PrepareParams& params, const Context& context) {
   check_positive(params.size_mm, "size");
   check_positive(params.unit_mm, "unit");

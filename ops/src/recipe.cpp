@@ -67,7 +67,7 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
     list.push_back({recipe.gyroid.density ? "gyroid.density" : "gyroid.wall_mm", sized(recipe.gyroid).wall_mm});
   if (hybrid && recipe.joint.enabled) {
     list.push_back({"joint.layer_mm", recipe.joint.layer_mm});
-    list.push_back({"joint.column_mm", recipe.joint.column_mm});
+    if (recipe.joint.columns) list.push_back({"joint.column_mm", recipe.joint.column_mm});
     list.push_back({"joint.min_wall_mm", recipe.joint.min_wall_mm});
   }
   return list;

@@ -265,6 +265,8 @@ const std::vector<Field>& table() {
             "share of material in a cell: walls get as thick as that takes; auto: as given"),
 
       field("joint.enabled", &R::joint, &JointParams::enabled, "layers and columns where parts meet"),
+      field("joint.columns", &R::joint, &JointParams::columns,
+            "support columns from a layer to the crystal, too; false: the layer alone"),
       field("joint.bridge", &R::joint, &JointParams::bridge,
             "how separate regions of a layer are joined: minimum spanning tree, or the paper's bounding boxes"),
       field("joint.layer_mm", &R::joint, &JointParams::layer_mm, {0.01, 1000},

@@ -58,20 +58,16 @@ PartInfill infill_of(const Part& part, InfillKind run) {
   return PartInfill::Solid;
 }
 
-std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe, const std::function<double(Vec3d)>& stress_mpa,
-                             const Context& context) {
+std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& recipe,
+                             const std::function<double(Vec3d)>& stress_mpa, const Context& context) {
   const TcsParams& tcs = recipe.tcs;
   if (tcs.grade == TcsGrade::None) return std::nullopt;
+  const double depth = tcs.grade_depth_mm, shell_mm = recipe.shell.thickness_mm;
   if (tcs.grade == TcsGrade::Stress) {
-    const StressGrade grade{.least = tcs.grade_least, .most = tcs.grade_most, .slope_mm = tcs.grade_depth_mm};
-    const Box3d box = bounds(mesh);
-    const Solid coarse = to_solid(mesh, {.grid = {.voxel_mm = box.longest_side() / 100}}, context).solid;
-    return thicker_where_stressed(grade, box, distance_to(coarse), stress_mpa, context);
+    const StressGrade grade{.least = tcs.grade_least, .most = tcs.grade_most, .slope_mm = depth};
+    return thicker_where_stressed(grade, box, body, stress_mpa, context);
   }
-  // Of its own, coarse voxel, so that the fine one changes nothing.
-  const double shell_mm = recipe.shell.thickness_mm, depth = recipe.tcs.grade_depth_mm;
-  const ToSolidParams coarse{.grid = {.voxel_mm = depth / 8}, .inside_band_mm = shell_mm + depth};
-  return thicker_at_surface(recipe.tcs, distance_to(to_solid(mesh, coarse, context).solid), shell_mm);
+  return thicker_at_surface(tcs, depth_table(body, box, depth / 6, context), shell_mm);
 }
 
 Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
@@ -211,7 +207,7 @@ struct Retouched final : Shape::Function {
 
 }  // namespace
 
-Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
+Shape as_function(const Shape& whole, const Solid& body, const Mended& mended, const Context& context) {
   const Shape b = distance_to(body), solid = distance_to(mended.tied.solid);
   const Shape made = with_mends(whole, b, mended);
 
@@ -224,6 +220,7 @@ Shape as_function(const Shape& whole, const Solid& body, const Mended& mended) {
   const std::vector<Vec3i> origins = blocks(body);
   std::vector<Differing> differing(origins.size());
   for_each_block(origins, voxel, [&](std::size_t number, const PointBlock& block) {
+    context.check();
     std::array<float, PointBlock::capacity> f, s;
     made.evaluate(block, f.data());
     solid.evaluate(block, s.data());

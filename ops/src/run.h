@@ -45,7 +45,7 @@ class Run {
 /// What a part gets in a run: in a hybrid by its kind, unless the user says otherwise.
 [[nodiscard]] PartInfill infill_of(const Part& part, InfillKind run);
 /// How much thicker the crystal is where (TcsParams::grade); none if it is not graded. `stress_mpa`: of a hybrid.
-[[nodiscard]] std::optional<Shape> grading(const Mesh& mesh, const Recipe& recipe,
+[[nodiscard]] std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& recipe,
                                            const std::function<double(Vec3d)>& stress_mpa, const Context& context);
 [[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
                         const std::optional<Shape>& thickness);
@@ -80,7 +80,7 @@ struct Design {
                             const AssembleParams& params);
 /// The printed solid as a function: the composed shape with its ties and mends, put right wherever a sample of the
 /// solid says otherwise (specks that went, pores that were filled).
-[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made);
+[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made, const Context& context);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
                                         const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe,

@@ -178,7 +178,7 @@ struct SolidStream::Impl {
     if (!measured[number]) measure(number, result, context);
     Mended mended = made;
     mended.tied.solid = result.solid;
-    result.printed = as_function(over(smooth_distance_to(result.body)), result.body, mended);
+    result.printed = as_function(over(smooth_distance_to(result.body)), result.body, mended, context);
     return result;
   }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "fibrolite/error.h"
 #include "fibrolite/realize.h"
@@ -136,6 +137,47 @@ TEST(Slice, RefusesWhatIsNoLength) {
   EXPECT_THROW((void)slice_grid({}, box, {1e-5, 1e-5}, 0.1), Error);
   EXPECT_THROW((void)slice_grid({}, box, {0.1, 0.1}, 1e-10), Error);
   EXPECT_THROW((void)slice(sphere({}, 1), slice_grid({}, box, {0.1, 0.1}, 0.1), 0, {.planes = 0}), Error);
+}
+
+TEST(SliceInto, ATileIsCutOutOfTheLayerByteForByte) {
+  const Shape ball = subtract(sphere({0.3, 0.2, 0.1}, 8), sphere({0.3, 0.2, 0.1}, 7));
+  const SliceGrid grid = around(9, 0.05, 0.25);
+  ASSERT_GT(grid.width, 300);
+  const Slice whole = slice(ball, grid, 30);
+  double sum = 0;
+  for (const PixelRange tile :
+       {PixelRange{0, 0, 137, 360}, PixelRange{137, 0, 223, 11}, PixelRange{137, 11, 223, 349}}) {
+    constexpr std::ptrdiff_t stride = 400;
+    std::vector<std::uint8_t> rows(static_cast<std::size_t>(stride * tile.height), 7);
+    sum += slice_into(rows.data(), stride, tile, ball, grid, 30);
+    for (int y = 0; y < tile.height; ++y) {
+      const std::uint8_t* row = rows.data() + y * stride;
+      ASSERT_TRUE(std::equal(row, row + tile.width, &whole.coverage(tile.x, tile.y + y))) << "row " << y;
+      ASSERT_EQ(std::count(row + tile.width, row + stride, 7), stride - tile.width) << "row " << y;
+    }
+  }
+  EXPECT_NEAR(sum, whole.area_mm2, 1e-9 * sum);
+}
+
+TEST(SliceInto, RefusesTilesThatReachBeyondTheLayerAndStopsWhenCancelled) {
+  const SliceGrid grid = around(9, 0.5, 0.25);
+  std::vector<std::uint8_t> rows(static_cast<std::size_t>(grid.width * grid.height));
+  const auto code = [&](const PixelRange& tile, std::ptrdiff_t stride, const Context& context = {}) {
+    try {
+      (void)slice_into(rows.data(), stride, tile, sphere({}, 8), grid, 10, {}, context);
+    } catch (const Error& error) {
+      return error.code();
+    }
+    return Code::Internal;
+  };
+  EXPECT_EQ(code({-1, 0, 5, 5}, 5), Code::BadRecipe);
+  EXPECT_EQ(code({0, 0, 0, 5}, 5), Code::BadRecipe);
+  EXPECT_EQ(code({10, 0, 2147483647, 5}, 36), Code::BadRecipe);
+  EXPECT_EQ(code({0, 30, 5, 7}, 5), Code::BadRecipe);
+  EXPECT_EQ(code({0, 0, 5, 5}, 4), Code::BadRecipe);
+  const Context stopped;
+  stopped.cancel();
+  EXPECT_EQ(code({0, 0, 5, 5}, 5, stopped), Code::Cancelled);
 }
 
 }  // namespace

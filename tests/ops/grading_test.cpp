@@ -61,6 +61,33 @@ TEST(Grading, SameBitsOnOneAndTwoThreads) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(one({i + 0.3, 7, 3}), two({i + 0.3, 7, 3}));
 }
 
+TEST(DepthTable, IsTheDepthInsideAndAtMostTheDistanceOutside) {
+  constexpr double step = 1.25;
+  const Shape ball = sphere({0, 0, 0}, 20);
+  const Shape depth = depth_table(ball, {{-20, -20, -20}, {20, 20, 20}}, step);
+  Random random(1, "depth", 0);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3d p{40 * random.uniform() - 20, 40 * random.uniform() - 20, 40 * random.uniform() - 20};
+    if (norm(p) < 20 - 2 * step) {
+      EXPECT_NEAR(depth(p), ball(p), 0.5 * step) << norm(p);
+    } else {
+      EXPECT_LE(depth(p), ball(p) + 0.5 * step) << norm(p);
+      EXPECT_GE(depth(p), -2 * step) << norm(p);
+    }
+  }
+  // Half way between two entries off the centre the interpolation is better by far than at the tip of the cone.
+  EXPECT_NEAR(depth({0, 10, 0.3}), -9.995, 0.03);
+}
+
+TEST(DepthTable, SameBitsOnOneAndTwoThreads) {
+  const auto made = [&](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return depth_table(sphere({50, 10, 10}, 9), bar, 0.7);
+  };
+  const Shape one = made(1), two = made(2);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(one({i + 0.3, 7, 3}), two({i + 0.3, 7, 3}));
+}
+
 TEST(Grading, RangesAreChecked) {
   const auto refused = [](StressGrade bad) {
     return testing::refusal([&] { (void)thicker_where_stressed(bad, bar, cuboid(bar), [](Vec3d) { return 1.0; }); });

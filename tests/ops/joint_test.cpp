@@ -223,6 +223,17 @@ TEST(Joint, CloserSpacingGivesMoreColumns) {
   EXPECT_GT(crystal_joint(close).columns.size(), crystal_joint().columns.size());
 }
 
+TEST(Joint, WithoutColumnsTheSameLayerStaysAndTouchesLess) {
+  JointParams alone;
+  alone.columns = false;
+  const Joint with = crystal_joint(), without = crystal_joint(alone);
+  EXPECT_TRUE(without.columns.empty());
+  EXPECT_EQ(without.columns_dropped, 0);
+  EXPECT_TRUE(without.warnings.empty());
+  EXPECT_EQ(without.layer.distance_mm.pixels, with.layer.distance_mm.pixels);
+  EXPECT_LT(without.contact_area_mm2, with.contact_area_mm2);
+}
+
 TEST(Joint, BothSidesGetColumnsWhenBothAreCrystal) {
   TcsParams shifted;
   shifted.shift_mm = {1, 2, 0.5};

@@ -40,7 +40,9 @@ class PieceSweep {
   void add(const Solid& solid, int low, int high, const Shape& anchor = nothing(), const Context& context = {});
 
   struct Result {
-    Pieces left;                   ///< As after clean(): the same, however the solid was cut.
+    /// But for specks that go and voids that are filled; the same, however the solid was cut. A void that is filled may
+    /// have been all that kept two pieces apart: they count as two here.
+    Pieces left;
     std::vector<bool> held;        ///< Of left.material, which have a sample in an anchor.
     std::vector<SampleBox> boxes;  ///< Of left.material, the blocks each reaches into.
     std::int64_t dropped = 0, filled = 0;

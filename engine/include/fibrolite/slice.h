@@ -3,7 +3,11 @@
 // layers below or above is held.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+
 #include "fibrolite/box.h"
+#include "fibrolite/context.h"
 #include "fibrolite/frame.h"
 #include "fibrolite/image.h"
 #include "fibrolite/shape.h"
@@ -31,6 +35,8 @@ struct SliceParams {
   /// slopes that are flatter than the pixel is wide become grey too.
   int planes = 1;
 };
+/// @throws Error BadRecipe: a range above.
+void check(const SliceParams& params);
 struct Slice {
   /// 0 empty to 255 full, row 0 at y = 0: the share of the pixel inside, rounded. The surface is taken as straight
   /// between the pixel's corners, where the distance is sampled; what is thinner than a pixel may be missed.
@@ -41,6 +47,20 @@ struct Slice {
 /// the shape's bound shows to be full or empty are not sampled. Parallel; the same bits on any number of threads.
 /// @throws Error BadRecipe: a range above.
 [[nodiscard]] Slice slice(const Shape& shape, const SliceGrid& grid, int layer, const SliceParams& params = {});
+
+/// Pixels [x, x + width) by [y, y + height) of a layer.
+struct PixelRange {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+/// A part of a layer into the caller's rows: pixel (x, y) of the layer goes to rows[(y - tile.y) * stride + x -
+/// tile.x]. The very bytes that slice() has there; returns the tile's area, mm2. Cost: as slice(), of the squares of
+/// 128 pixels and blocks of 16 that the tile touches; no memory. Parallel, and may be called from several threads at
+/// once.
+/// @throws Error BadRecipe: a range above, a tile that is empty or reaches beyond the layer, a stride below its width;
+/// Cancelled (the rows are then part done).
+[[nodiscard]] double slice_into(std::uint8_t* rows, std::ptrdiff_t stride, const PixelRange& tile, const Shape& shape,
+                                const SliceGrid& grid, int layer, const SliceParams& params = {},
+                                const Context& context = {});
 
 /// The solid's distance, interpolated by cubics through 4 x 4 x 4 samples (Catmull and Rom 1974): smooth across voxels,
 /// and round sticks keep their thickness, of which distance_to() takes about voxel^2 / (8 radius). For pixels finer

@@ -50,6 +50,11 @@ std::vector<Frame> rotation_minimising(const std::vector<Vec3d>& p, bool closed)
   return frames;
 }
 
+[[gnu::target_clones("avx2", "default")]] void take_where(const int* __restrict number, int wanted, int count,
+                                                          const float* __restrict from, float* __restrict to) {
+  for (int i = 0; i < count; ++i) to[i] = number[i] == wanted ? from[i] : to[i];
+}
+
 }  // namespace
 
 Sweep::Plane::Plane(const Frame& f)
@@ -133,44 +138,64 @@ bool Sweep::in_slab(int slab, Vec3d p) const {
   return (slab < 0 || height(slab) >= 0) && (slab == last() || height(slab + 1) < 0);
 }
 
-void Sweep::map_in_slab(int slab, const float* x, const float* y, const float* z, int count, Places out) const {
-  // The optimizer takes the loops apart only if it knows that answers overlap no points and no question is asked
-  // inside.
-  const auto k = static_cast<std::size_t>(std::max(slab, 0));
-  const Plane a = planes_[k];
-  const Station& station = stations_[k];
-  const auto from = static_cast<float>(station.at_mm);
-  const auto each = [count](const float* __restrict px, const float* __restrict py, const float* __restrict pz,
-                            float* __restrict u, float* __restrict v, float* __restrict along, auto&& place) {
-    for (int i = 0; i < count; ++i) place(px[i], py[i], pz[i], u[i], v[i], along[i]);
-  };
-  std::array<float, PointBlock::capacity> unasked;
-  float* along = out.along != nullptr ? out.along : unasked.data();
-  if (slab < 0 || slab == last()) {
-    each(x, y, z, out.u, out.v, along, [&](float px, float py, float pz, float& u, float& v, float& way) {
-      const float dx = px - a.cx, dy = py - a.cy, dz = pz - a.cz;
-      u = dx * a.ux + dy * a.uy + dz * a.uz;
-      v = dx * a.vx + dy * a.vy + dz * a.vz;
-      way = from + dx * a.tx + dy * a.ty + dz * a.tz;
-    });
-    return;
+// The optimizer takes these loops apart only if it knows that answers overlap no points, and asks for no calls inside.
+[[gnu::target_clones("avx2", "default")]] void Sweep::map_straight(const Plane& plane, float from,
+                                                                   const float* __restrict x, const float* __restrict y,
+                                                                   const float* __restrict z, int count,
+                                                                   float* __restrict u, float* __restrict v,
+                                                                   float* __restrict along) {
+  const Plane a = plane;
+  for (int i = 0; i < count; ++i) {
+    const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
+    u[i] = dx * a.ux + dy * a.uy + dz * a.uz;
+    v[i] = dx * a.vx + dy * a.vy + dz * a.vz;
+    along[i] = from + dx * a.tx + dy * a.ty + dz * a.tz;
   }
-  const Plane b = planes_[k + 1];
-  const auto length = static_cast<float>(stations_[k + 1].at_mm) - from;
-  const auto bend_u = static_cast<float>(0.5 * station.bend_u), bend_v = static_cast<float>(0.5 * station.bend_v);
-  each(x, y, z, out.u, out.v, along, [&](float px, float py, float pz, float& u, float& v, float& way) {
-    const float dx = px - a.cx, dy = py - a.cy, dz = pz - a.cz;
-    const float ex = px - b.cx, ey = py - b.cy, ez = pz - b.cz;
-    const float above = std::max(0.F, dx * a.tx + dy * a.ty + dz * a.tz);
-    const float below = std::max(0.F, -(ex * b.tx + ey * b.ty + ez * b.tz));
-    const float s = above / std::max(above + below, 1e-20F);
+}
+
+[[gnu::target_clones("avx2", "default")]] void Sweep::map_between(const Plane& start, const Plane& end,
+                                                                  const Stretch& stretch, const float* __restrict x,
+                                                                  const float* __restrict y, const float* __restrict z,
+                                                                  int count, float* __restrict u, float* __restrict v,
+                                                                  float* __restrict along) {
+  const Plane a = start, b = end;
+  const Stretch over = stretch;
+  for (int i = 0; i < count; ++i) {
+    const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
+    const float ex = x[i] - b.cx, ey = y[i] - b.cy, ez = z[i] - b.cz;
+    const float past = dx * a.tx + dy * a.ty + dz * a.tz, short_of = -(ex * b.tx + ey * b.ty + ez * b.tz);
+    // max(0, ...) without a choice, which would make the loop one of branches.
+    const float above = 0.5F * (past + std::abs(past)), below = 0.5F * (short_of + std::abs(short_of));
+    const float s = above / (above + below + 1e-20F);
     // Each end's frame alone sees the limb bend away, by the sagitta; between them that is (1 - s) * above * bend / 2
     // too much.
     const float sagitta = (1 - s) * above;
-    u = (1 - s) * (dx * a.ux + dy * a.uy + dz * a.uz) + s * (ex * b.ux + ey * b.uy + ez * b.uz) - sagitta * bend_u;
-    v = (1 - s) * (dx * a.vx + dy * a.vy + dz * a.vz) + s * (ex * b.vx + ey * b.vy + ez * b.vz) - sagitta * bend_v;
-    way = from + s * length;
-  });
+    u[i] = (1 - s) * (dx * a.ux + dy * a.uy + dz * a.uz) + s * (ex * b.ux + ey * b.uy + ez * b.uz) -
+           sagitta * over.half_bend_u;
+    v[i] = (1 - s) * (dx * a.vx + dy * a.vy + dz * a.vz) + s * (ex * b.vx + ey * b.vy + ez * b.vz) -
+           sagitta * over.half_bend_v;
+    along[i] = over.from_mm + s * over.length_mm;
+  }
+}
+
+[[gnu::target_clones("avx2", "default")]] void Sweep::count_passed(const Plane& plane, const float* __restrict x,
+                                                                   const float* __restrict y, const float* __restrict z,
+                                                                   int count, int* __restrict passed) {
+  const Plane p = plane;
+  for (int i = 0; i < count; ++i)
+    passed[i] += (x[i] - p.cx) * p.tx + (y[i] - p.cy) * p.ty + (z[i] - p.cz) * p.tz >= 0 ? 1 : 0;
+}
+
+void Sweep::map_in_slab(int slab, const float* x, const float* y, const float* z, int count, Places out) const {
+  const auto k = static_cast<std::size_t>(std::max(slab, 0));
+  const Station& station = stations_[k];
+  const auto from = static_cast<float>(station.at_mm);
+  std::array<float, PointBlock::capacity> unasked;
+  float* along = out.along != nullptr ? out.along : unasked.data();
+  if (slab < 0 || slab == last()) return map_straight(planes_[k], from, x, y, z, count, out.u, out.v, along);
+  const Stretch stretch{from, static_cast<float>(stations_[k + 1].at_mm) - from,
+                        static_cast<float>(0.5 * station.bend_u), static_cast<float>(0.5 * station.bend_v)};
+  map_between(planes_[k], planes_[k + 1], stretch, x, y, z, count, out.u, out.v, along);
 }
 
 void Sweep::map(const PointBlock& block, float* u, float* v, float* along) const {
@@ -208,24 +233,17 @@ void Sweep::map_in_run(int from, int to, const PointBlock& block, Vec3d center, 
   while (from < to && height(to) < -radius) --to;
   if (from == to) return map_in_slab(from, block.x, block.y, block.z, block.count, out);
 
-  const auto count = static_cast<std::size_t>(block.count);
   std::array<int, PointBlock::capacity> passed{};
-  for (int k = from + 1; k <= to; ++k) {
-    const Plane& p = planes_[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < count; ++i)
-      passed[i] += (block.x[i] - p.cx) * p.tx + (block.y[i] - p.cy) * p.ty + (block.z[i] - p.cz) * p.tz >= 0 ? 1 : 0;
-  }
+  for (int k = from + 1; k <= to; ++k)
+    count_passed(planes_[static_cast<std::size_t>(k)], block.x, block.y, block.z, block.count, passed.data());
   std::array<float, PointBlock::capacity> slab_u, slab_v, slab_along;
   const bool where = out.along != nullptr;
   for (int slab = from; slab <= to; ++slab) {
     map_in_slab(slab, block.x, block.y, block.z, block.count,
                 {slab_u.data(), slab_v.data(), where ? slab_along.data() : nullptr});
-    for (std::size_t i = 0; i < count; ++i) {
-      out.u[i] = passed[i] == slab - from ? slab_u[i] : out.u[i];
-      out.v[i] = passed[i] == slab - from ? slab_v[i] : out.v[i];
-    }
-    for (std::size_t i = 0; where && i < count; ++i)
-      out.along[i] = passed[i] == slab - from ? slab_along[i] : out.along[i];
+    take_where(passed.data(), slab - from, block.count, slab_u.data(), out.u);
+    take_where(passed.data(), slab - from, block.count, slab_v.data(), out.v);
+    if (where) take_where(passed.data(), slab - from, block.count, slab_along.data(), out.along);
   }
 }
 

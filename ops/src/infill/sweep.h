@@ -44,6 +44,16 @@ class Sweep {
     float cx, cy, cz, tx, ty, tz, ux, uy, uz, vx, vy, vz;
     explicit Plane(const Frame& frame);
   };
+  /// A slab's line: where it starts and how long it is, and half the turn of its tangent towards u and v.
+  struct Stretch {
+    float from_mm, length_mm, half_bend_u, half_bend_v;
+  };
+  static void map_straight(const Plane& plane, float from, const float* x, const float* y, const float* z, int count,
+                           float* u, float* v, float* along);
+  static void map_between(const Plane& start, const Plane& end, const Stretch& stretch, const float* x, const float* y,
+                          const float* z, int count, float* u, float* v, float* along);
+  /// Adds one to each point's number if it lies beyond the plane.
+  static void count_passed(const Plane& plane, const float* x, const float* y, const float* z, int count, int* passed);
   [[nodiscard]] double distance_to_slab(int slab, Vec3d p) const;
   [[nodiscard]] bool in_slab(int slab, Vec3d p) const;
   /// Where answers go; `along` may be null.

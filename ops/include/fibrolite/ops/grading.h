@@ -24,4 +24,10 @@ struct StressGrade {
 [[nodiscard]] Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const Shape& body,
                                            const std::function<double(Vec3d)>& stress_mpa, const Context& context = {});
 
+/// How deep inside `body`, an exact distance (within half a step): its values on a lattice over `box`, trilinear
+/// between. Where a neighbourhood of the lattice lies outside, only a lower bound of them; outside the box the nearest
+/// entry counts. `step_mm` > 0, coarser beyond 2 million entries. For fields that vary over several steps.
+/// @throws Error Cancelled. Cost: one value of `body` per entry inside or near, one per 64 of the others; parallel.
+[[nodiscard]] Shape depth_table(const Shape& body, const Box3d& box, double step_mm, const Context& context = {});
+
 }  // namespace fibrolite

@@ -17,6 +17,7 @@ enum class Bridge { Mst, Bbox };  ///< Ours: minimum spanning tree of bridges; t
 
 struct JointParams {
   bool enabled = true;
+  bool columns = true;  ///< Support columns; without them the layer alone joins, where it touches.
   Bridge bridge = Bridge::Mst;
   double layer_mm = 1.2;     ///< Thickness of the transient layer (half in each part); 2 voxels or more.
   double column_mm = 0.8;    ///< Diameter of a support column; 2 voxels or more.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fibrolite/context.h"
+#include "fibrolite/frame.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/mesh_io.h"
 
@@ -15,6 +16,8 @@ namespace fibrolite {
 enum class Up { X, Y, Z, MinusX, MinusY, MinusZ };
 /// The unit vector of an Up.
 [[nodiscard]] Vec3d direction(Up up);
+/// The frame whose z is up: the world's own for Up::Z. Layers lie across it.
+[[nodiscard]] Frame upright(Up up);
 
 struct PrepareParams {
   std::optional<double> size_mm{};  ///< Scale so that the longest side has this length; > 0.
