@@ -42,6 +42,14 @@ struct GenerateOptions {
 
 bool is_vdb(const fs::path& file) { return file.extension() == ".vdb" || file.extension() == ".VDB"; }
 
+/// Of a file: what its format takes for a triangle and half a vertex, or a voxel; compressed files as measured.
+double expected_bytes(const fs::path& file, const Prediction& expected) {
+  const std::string ending = file.extension().string();
+  if (is_vdb(file)) return 2.8 * expected.active_voxels;
+  const double triangle = ending == ".ply" ? 19 : ending == ".obj" ? 48 : ending == ".3mf" ? 14 : 50;
+  return triangle * expected.triangles;
+}
+
 std::string plan(const GenerateOptions& options, const Model& model, const HybridizeParams& params) {
   const Vec3d size = bounds(model.mesh).size();
   std::string text = "model     " + options.model.path.string() + ", " + std::to_string(model.mesh.triangles.size()) +
@@ -49,10 +57,14 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
                      " mm\n";
   text += "infill    " + std::string(name_of(options.infill)) + "\n";
   text += "voxel     " + number_text(*params.voxel_mm) + " mm\n";
-  text += "memory    at most " +
-          memory_text(predict_memory(model.mesh, *params.voxel_mm, params.recipe, params.infill)) + " of " +
-          memory_text(options.run.allowed_bytes()) + "\n";
-  for (const fs::path& target : options.targets()) text += "output    " + target.string() + "\n";
+  const Prediction expected = predict(model.mesh, *params.voxel_mm, params.recipe, params.infill);
+  text += "solid     about " + number_text(expected.active_voxels / 1e6, 2) + " million voxels, a mesh of " +
+          number_text(expected.triangles / 1e6, 2) + " million triangles\n";
+  text += "memory    about " + memory_text(expected.memory_bytes) + " of " + memory_text(options.run.allowed_bytes()) +
+          "\n";
+  for (const fs::path& file : options.output.files)
+    text += "output    " + file.string() + ", about " + memory_text(expected_bytes(file, expected)) + "\n";
+  text += "output    " + options.output.report_path().string() + "\n";
   return text + "dry run: nothing was written\n";
 }
 

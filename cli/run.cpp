@@ -49,7 +49,7 @@ Model load_model(const ModelOptions& options, Report& report, const Context& con
 }
 
 void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run) {
-  const auto needed = [&](double voxel) { return predict_memory(model, voxel, recipe, infill); };
+  const auto needed = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes; };
   const double allowed = run.allowed_bytes();
   if (needed(voxel_mm) <= allowed) return;
   const std::string what =

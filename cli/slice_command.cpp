@@ -110,7 +110,7 @@ int axis_of(Up up) {
 std::optional<SlabPlan> slabs_for(const SliceOptions& options, const Mesh& model, const HybridizeParams& params,
                                   double layer_mm, double slicing_bytes) {
   const double voxel = *params.voxel_mm, allowed = options.run.allowed_bytes();
-  if (predict_memory(model, voxel, params.recipe, options.infill) + slicing_bytes <= allowed) return std::nullopt;
+  if (predict(model, voxel, params.recipe, options.infill).memory_bytes + slicing_bytes <= allowed) return std::nullopt;
   const double margin_mm = 0.5 * layer_mm + 4 * voxel;
   SlabPlan plan = plan_slabs(model, voxel, params.recipe, options.infill, axis_of(options.model.up), margin_mm,
                              allowed - slicing_bytes);
@@ -175,7 +175,7 @@ std::string plan(const SliceOptions& options, const Source& source, const std::v
   const Vec3d size = source.box.size();
   std::string text = "model     " + options.model.path.string() + ", ";
   text += number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) + " mm\n";
-  text += layers_text(described(plates)) + "memory    at most ";
+  text += layers_text(described(plates)) + "memory    about ";
   text += memory_text(source.memory + slicing_memory(plates.front().grid)) + " of ";
   text += memory_text(options.run.allowed_bytes());
   if (source.slabs) text += ", in " + std::to_string(source.slabs->borders.size() - 1) + " slabs";
@@ -235,7 +235,7 @@ void slice_to_files(const SliceOptions& options) {
         slabs_for(options, model.mesh, params, options.layer_mm.value_or(0.05), slicing_memory(plates.front().grid));
     source.slabs = params.slabs;
     source.memory = params.slabs ? params.slabs->memory_bytes
-                                 : predict_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill);
+                                 : predict(model.mesh, *params.voxel_mm, params.recipe, options.infill).memory_bytes;
   }
   check_plates(options, plates, source.memory);
   if (options.run.dry_run) return print(plan(options, source, plates));

@@ -47,7 +47,7 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
   filled->slice = params.slice;
   check(params.slice);
   check_recipe(fill.recipe, *fill.voxel_mm, fill.infill);
-  if (const double needed = predict_memory(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill);
+  if (const double needed = predict(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill).memory_bytes;
       needed > params.max_memory_bytes)
     throw Error(
         Code::TooLarge,

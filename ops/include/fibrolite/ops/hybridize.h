@@ -59,7 +59,12 @@ struct Hybrid {
 /// The voxel a run will use, mm.
 [[nodiscard]] double choose_voxel(const Box3d& model, const Recipe& recipe, InfillKind infill,
                                   std::optional<double> wanted);
-/// Memory a run will need at most, bytes, predicted from area, volume and voxel before anything is allocated.
-[[nodiscard]] double predict_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill);
+/// What a run will come to, from area, volume, voxel and recipe, before anything is allocated; within some 30 % where
+/// members are thinner than their spacing.
+struct Prediction {
+  double memory_bytes = 0;  ///< At its highest.
+  double active_voxels = 0, triangles = 0;
+};
+[[nodiscard]] Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill);
 
 }  // namespace fibrolite
