@@ -31,20 +31,19 @@ std::array<Vec3d, probe_count> even_directions() {
 
 /// Is there material at this distance from a point, that the line through it along `own` with this radius does not
 /// explain? The cone around `own` is left out: there the stick's own node may be.
-bool touched(const Solid& solid, Vec3d at, Vec3d own, double line_mm, double reach_mm) {
+bool touched(const Shape& solid, Vec3d at, Vec3d own, double line_mm, double reach_mm) {
   static const auto directions = even_directions();
   return std::any_of(directions.begin(), directions.end(), [&](Vec3d d) {
     const double along = dot(d, own);
-    return along < own_cone && reach_mm * std::sqrt(1 - along * along) > line_mm &&
-           solid.distance(at + reach_mm * d) < 0;
+    return along < own_cone && reach_mm * std::sqrt(1 - along * along) > line_mm && solid(at + reach_mm * d) < 0;
   });
 }
 
 class Search {
  public:
-  Search(const Sticks& sticks, const Shape& body, double shell_mm, const Solid& solid)
+  Search(const Sticks& sticks, const Shape& body, double shell_mm, const Shape& solid, double voxel_mm)
       : ball_mm_(0.5 * sticks.ball_mm),
-        skin_mm_(solid.grid().voxel_mm),
+        skin_mm_(voxel_mm),
         region_(sticks.region),
         lumen_(offset(body, -shell_mm)),
         solid_(solid) {}
@@ -64,7 +63,7 @@ class Search {
       if (a) node(sticks[i].a);
       if (b) node(sticks[i].b);
       if (a && b) {
-        if (solid_.distance(0.5 * (sticks[i].a + sticks[i].b)) >= 0) continue;
+        if (solid_(0.5 * (sticks[i].a + sticks[i].b)) >= 0) continue;
         hold(sticks[i].a, sticks[i]);
         hold(sticks[i].b, sticks[i]);
       } else if (a) {
@@ -78,7 +77,7 @@ class Search {
   [[nodiscard]] std::vector<LooseEnd> result() const {
     std::vector<LooseEnd> free = free_;
     for (const auto& [key, node] : nodes_) {
-      if (node.sticks > 1 || solid_.distance(node.at) >= 0) continue;
+      if (node.sticks > 1 || solid_(node.at) >= 0) continue;
       const bool alone = node.sticks == 0;
       const Vec3d own = alone ? Vec3d{} : normalized(node.other - node.at);
       if (touched(solid_, node.at, own, 0, ball_mm_ + skin_mm_)) continue;
@@ -112,7 +111,7 @@ class Search {
     const double length = std::max(0.0, norm(end - from) - ball_mm_);
     const Vec3d back = normalized(from - end);
     for (double s = 0; s < length; s += skin_mm_)
-      if (solid_.distance(end + s * back) < 0 && beside(end + s * back, back, radius_mm)) return end + s * back;
+      if (solid_(end + s * back) < 0 && beside(end + s * back, back, radius_mm)) return end + s * back;
     return end + length * back;
   }
 
@@ -125,15 +124,15 @@ class Search {
       const Vec3d p = from + middle * (to - from);
       (lumen_(p) < 0 && region_(p) < 0 ? in : out) = middle;
     }
-    if (solid_.distance(from + 0.5 * in * (to - from)) >= 0) return;  // it is not there
+    if (solid_(from + 0.5 * in * (to - from)) >= 0) return;  // it is not there
     if (lumen_(from + out * (to - from)) >= 0) return hold(from, stick);
     // Out of the part: on and on, as far as there is material.
     const double length = norm(to - from);
     const Vec3d along = (1 / length) * (to - from);
     double end = in * length;
-    while (end > 0 && solid_.distance(from + end * along) >= 0) end -= skin_mm_;
+    while (end > 0 && solid_(from + end * along) >= 0) end -= skin_mm_;
     bool knob = false;  // some of the ball of the node that was cut off
-    for (double s = std::max(end, 0.0); s < length && solid_.distance(from + s * along) < 0; s += skin_mm_) {
+    for (double s = std::max(end, 0.0); s < length && solid_(from + s * along) < 0; s += skin_mm_) {
       knob = s > length - ball_mm_ - skin_mm_;
       if (beside(from + s * along, -along, knob ? ball_mm_ : stick.radius_mm)) return hold(from, stick);
       end = s;
@@ -147,16 +146,16 @@ class Search {
 
   const double ball_mm_, skin_mm_;
   const Shape region_, lumen_;
-  const Solid& solid_;
+  const Shape& solid_;
   std::map<Key, Node> nodes_;
   std::vector<LooseEnd> free_;
 };
 
 }  // namespace
 
-std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double shell_mm, const Solid& solid,
-                                 const Context& context) {
-  Search search(sticks, body, shell_mm, solid);
+std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double shell_mm, const Shape& solid,
+                                 double voxel_mm, const Context& context) {
+  Search search(sticks, body, shell_mm, solid, voxel_mm);
   std::vector<Capsule> batch;
   sticks.visit(sticks.box, [&](const Capsule& stick) {
     batch.push_back(stick);
@@ -167,6 +166,11 @@ std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double
   });
   search.add(batch);
   return search.result();
+}
+
+std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double shell_mm, const Solid& solid,
+                                 const Context& context) {
+  return loose_ends(sticks, body, shell_mm, distance_to(solid), solid.grid().voxel_mm, context);
 }
 
 }  // namespace fibrolite

@@ -140,11 +140,7 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
   const Density d = density(voxel_mm, recipe, infill);
   const auto count = static_cast<int>(p.area_mm2.size());
   SlabPlan plan{.axis = axis};
-  // Whether a stick's end hangs free is seen with the whole stick.
-  const TcsParams tcs = sized(recipe.tcs);
-  const double stick_mm = tcs.form == TcsForm::Sticks ? 0.5 * tcs.cell_mm.most() + tcs.ball_mm : 0;
-  const double most_mm = std::max(margin_mm, stick_mm + 2 * voxel_mm);
-  const int margin = std::max(1, static_cast<int>(std::ceil(most_mm / (8 * voxel_mm))));
+  const int margin = std::max(1, static_cast<int>(std::ceil(margin_mm / (8 * voxel_mm))));
   plan.margin_vox = 8 * margin;
   std::vector<double> sum{0};
   for (std::size_t i = 0; i < p.area_mm2.size(); ++i) {

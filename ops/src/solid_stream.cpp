@@ -11,6 +11,7 @@
 #include "fibrolite/realize.h"
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
+#include "fibrolite/winding.h"
 #include "run.h"
 
 namespace fibrolite {
@@ -19,7 +20,6 @@ namespace {
 constexpr int rounds = 3;  // as tie()
 
 Context quiet(const Context& context) { return context.part(0, 0, ""); }
-double& coordinate(Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 int& along(Vec3i& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 }  // namespace
@@ -85,6 +85,17 @@ struct SolidStream::Impl {
     made.tied.dropped = found.dropped;
     made.tied.filled = found.filled;
     made.tied.left = found.left;
+  }
+
+  /// Of the solid as a function, its body exact: no slab would hold whole sticks.
+  void count_loose_ends(const Mesh& model, const Context& context) {
+    const std::vector<Sticks> parts = sticks_of(design.parts, design.fills);
+    if (parts.empty()) return;
+    const Shape exact = distance_to(WindingTree(model)), solid = with_mends(over(exact), exact, made);
+    for (const Sticks& sticks : parts) {
+      made.tied.dangling += static_cast<std::int64_t>(
+          loose_ends(sticks, exact, design.assembly.shell_mm, solid, grid.voxel_mm, quiet(context)).size());
+    }
   }
 
   void sweep(const TieParams& params, const Context& context) {
@@ -190,25 +201,6 @@ struct SolidStream::Impl {
     body_vox += slab.body.volume_vox(slab.range);
     solid_vox += slab.solid.volume_vox(slab.range);
     active_voxels += slab.solid.active_voxels(slab.range);
-    count_loose_ends(slab, context);
-  }
-
-  /// Those whose end lies in the slab; the margin holds the sticks they belong to.
-  void count_loose_ends(const Slab& slab, const Context& context) {
-    const double h = grid.voxel_mm, low = slab.range.low * h, high = slab.range.high * h;
-    const double margin = (plan.margin_vox - 1) * h;
-    for (Sticks sticks : sticks_of(design.parts, design.fills)) {
-      double& from = coordinate(sticks.box.min, plan.axis);
-      double& to = coordinate(sticks.box.max, plan.axis);
-      from = std::max(from, low - margin);
-      to = std::min(to, high + margin);
-      if (from >= to) continue;
-      for (const LooseEnd& end :
-           loose_ends(sticks, distance_to(slab.body), design.assembly.shell_mm, slab.solid, quiet(context))) {
-        const double at = end.end_mm[plan.axis];
-        made.tied.dangling += at >= low && at < high ? 1 : 0;
-      }
-    }
   }
 
   void finish(Report& report) const {
@@ -222,6 +214,8 @@ struct SolidStream::Impl {
     report.solid.active_voxels = active_voxels;
     report.solid.voxel_mm = h;
     report_solid(made.tied, design.fills, body_vox * h * h * h, solid_vox * h * h * h, design.recipe.material, report);
+    if (design.recipe.print.check)
+      report.warnings.emplace_back("the print checks were left out: they need the whole solid in memory");
     if (made.tied.dangling > 0) {
       report.warnings.push_back(
           std::to_string(made.tied.dangling) +
@@ -252,7 +246,8 @@ SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid 
   auto impl = std::make_shared<SolidStream::Impl>(model, std::move(design), plan, grid, context.part(0, 0.3, "body"));
   const std::vector<std::string>& repairs = impl->voxels.repairs();
   report.model.repairs.insert(report.model.repairs.end(), repairs.begin(), repairs.end());
-  impl->make_one_piece(context.part(0.3, 1, "one piece"));
+  impl->make_one_piece(context.part(0.3, 0.95, "one piece"));
+  impl->count_loose_ends(model, context);
   return SolidStream(std::move(impl));
 }
 

@@ -32,5 +32,8 @@ struct LooseEnd {
 /// Lengths in mm. Cost: O(sticks in the box). The same answer on any number of threads.
 [[nodiscard]] std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double shell_mm,
                                                const Solid& solid, const Context& context = {});
+/// The same on the solid as a function, looked at in steps of a voxel; for solids that are never whole.
+[[nodiscard]] std::vector<LooseEnd> loose_ends(const Sticks& sticks, const Shape& body, double shell_mm,
+                                               const Shape& solid, double voxel_mm, const Context& context = {});
 
 }  // namespace fibrolite
