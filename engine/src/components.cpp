@@ -5,7 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <limits>
+#include <bit>
 #include <numeric>
 
 #include "fibrolite/error.h"
@@ -15,36 +15,59 @@ namespace {
 
 constexpr std::array<openvdb::Index, 3> stride{64, 8, 1};  // of x, y, z in a leaf's buffer
 
+/// A leaf's samples as bits: bit 8 y + z of word x.
+using Bits = std::array<std::uint64_t, 8>;
+
+/// All of `within` that hangs together with what is set in `grown`. Whole planes move at a time.
+void flood(Bits& grown, const Bits& within) {
+  constexpr std::uint64_t first_column = 0x0101010101010101U;
+  for (bool changed = true; changed;) {
+    changed = false;
+    const auto spread = [&](std::size_t x, std::uint64_t from) {
+      std::uint64_t now = (grown[x] | from) & within[x];
+      for (std::uint64_t before = ~now; now != before;) {
+        before = now;
+        now |= (now << 1 & ~first_column) | (now & ~first_column) >> 1 | now << 8 | now >> 8;
+        now &= within[x];
+      }
+      changed = changed || now != grown[x];
+      grown[x] = now;
+    };
+    for (std::size_t x = 0; x < 8; ++x) spread(x, x > 0 ? grown[x - 1] : 0);
+    for (std::size_t x = 7; x-- > 0;) spread(x, grown[x + 1]);
+  }
+}
+
 LeafLabels label_leaf(const float* value, float below) {
   LeafLabels result;
-  constexpr auto unset = std::numeric_limits<std::uint16_t>::max();
-  result.label.fill(unset);
-  std::array<std::uint16_t, LeafLabels::size> stack;
-  for (std::uint16_t seed = 0; seed < LeafLabels::size; ++seed) {
-    if (result.label[seed] != unset) continue;
-    const auto id = static_cast<std::uint16_t>(result.voxels.size());
-    const bool inside = value[seed] < below;
-    std::size_t top = 0;
-    std::uint16_t count = 0;
-    stack[top++] = seed;
-    result.label[seed] = id;
-    while (top > 0) {
-      const unsigned v = stack[--top];
-      ++count;
-      for (unsigned axis = 0; axis < 3; ++axis) {
-        const unsigned step = stride[axis], at = (v / step) & 7U;
-        if (at > 0 && result.label[v - step] == unset && (value[v - step] < below) == inside) {
-          result.label[v - step] = id;
-          stack[top++] = static_cast<std::uint16_t>(v - step);
-        }
-        if (at < 7 && result.label[v + step] == unset && (value[v + step] < below) == inside) {
-          result.label[v + step] = id;
-          stack[top++] = static_cast<std::uint16_t>(v + step);
-        }
+  result.label.fill(0);
+  Bits inside;
+  for (std::size_t x = 0; x < 8; ++x) {
+    std::uint64_t word = 0;
+    for (std::size_t i = 0; i < 64; ++i) word |= std::uint64_t{value[64 * x + i] < below} << i;
+    inside[x] = word;
+  }
+  Bits open;
+  open.fill(~std::uint64_t{0});
+  for (std::size_t x = 0; x < 8; ++x) {
+    while (open[x] != 0) {
+      const auto bit = static_cast<std::size_t>(std::countr_zero(open[x]));
+      const bool in = (inside[x] >> bit & 1U) != 0;
+      Bits within, grown{};
+      for (std::size_t w = 0; w < 8; ++w) within[w] = open[w] & (in ? inside[w] : ~inside[w]);
+      grown[x] = std::uint64_t{1} << bit;
+      flood(grown, within);
+      const auto id = static_cast<std::uint16_t>(result.voxels.size());
+      int count = 0;
+      for (std::size_t w = 0; w < 8; ++w) {
+        open[w] &= ~grown[w];
+        count += std::popcount(grown[w]);
+        for (std::uint64_t rest = id > 0 ? grown[w] : 0; rest != 0; rest &= rest - 1)
+          result.label[64 * w + static_cast<std::size_t>(std::countr_zero(rest))] = id;
       }
+      result.voxels.push_back(static_cast<std::uint16_t>(count));
+      result.first.push_back(static_cast<std::uint16_t>(64 * x + bit));
     }
-    result.voxels.push_back(count);
-    result.first.push_back(seed);
   }
   return result;
 }
