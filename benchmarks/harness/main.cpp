@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "child.h"
+#include "history.h"
 #include "suite.h"
 #include "table.h"
 
@@ -23,6 +24,8 @@ struct Options {
   fs::path bin, out;
   int repeats = 0, threads = 0;
   std::string only;
+  fs::path history;
+  std::string commit, compare;
 };
 
 std::string first_line(const fs::path& log) {
@@ -83,6 +86,8 @@ Run median(const Case& c, const Options& options) {
 
 int bench(const Options& options) {
   fs::create_directories(options.out);
+  nlohmann::json then;
+  if (!options.compare.empty()) then = recall(options.history, options.compare);
   nlohmann::json json{
       {"cores", std::thread::hardware_concurrency()}, {"threads", options.threads}, {"cases", nlohmann::json::array()}};
   int failed = 0;
@@ -104,7 +109,9 @@ int bench(const Options& options) {
   std::cout << "compute: stages without reading, preparing and writing files; x floor: compute over the floor's; "
                "process: whole "
                "processes.\n"
-            << "written: " << (options.out / "bench.json").string() << '\n';
+            << "written: " << (options.out / "bench.json").string() << std::endl;
+  if (!options.history.empty() && !options.commit.empty()) remember(options.history, options.commit, json);
+  if (!then.is_null()) print_comparison(json, then, options.compare);
   return failed == 0 ? 0 : 1;
 }
 
@@ -121,6 +128,9 @@ int main(int argc, char** argv) try {
   app.add_option("--only", options.only, "Only cases whose name contains this");
   app.add_option("--repeat", options.repeats, "Runs of each case, the median counts (default: 3 for peer-tcs, else 1)");
   app.add_option("--threads", options.threads, "Threads of each run (default: all)");
+  auto* history = app.add_option("--history", options.history, "Folder of the results of earlier commits");
+  app.add_option("--commit", options.commit, "Keep the results under this name")->needs(history);
+  app.add_option("--compare", options.compare, "Say how they compare with those of this commit")->needs(history);
   app.add_flag("--quick", options.suite.quick, "A minute instead of many");
   CLI11_PARSE(app, argc, argv)
   return bench(options);
