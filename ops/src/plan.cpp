@@ -140,7 +140,10 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
   const Density d = density(voxel_mm, recipe, infill);
   const auto count = static_cast<int>(p.area_mm2.size());
   SlabPlan plan{.axis = axis};
-  const int margin = std::max(1, static_cast<int>(std::ceil(margin_mm / (8 * voxel_mm))));
+  // The print checks look through walls and gaps up to their limits, and some voxels on.
+  const PrintParams& limits = recipe.print;
+  const double checked_mm = limits.check ? std::max(limits.wall_mm, limits.gap_mm) + 5 * voxel_mm : 0;
+  const int margin = std::max(1, static_cast<int>(std::ceil(std::max(margin_mm, checked_mm) / (8 * voxel_mm))));
   plan.margin_vox = 8 * margin;
   std::vector<double> sum{0};
   for (std::size_t i = 0; i < p.area_mm2.size(); ++i) {

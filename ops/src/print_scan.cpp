@@ -18,6 +18,9 @@
 namespace fibrolite {
 namespace {
 
+/// Areas are summed in multiples of 1 / this: exact, in any order.
+constexpr double exact_mm2 = 1 << 28;
+
 /// A dense box of samples, in voxels: values, their gradient and where a ray leaves what it is in.
 class Window {
  public:
@@ -91,12 +94,14 @@ Tiles tiles_of(const Solid& solid, double reach_vox) {
 }
 
 /// All crossings of the lattice's edges with the surface in one tile.
-void find_crossings(const Window& window, Vec3i origin, int edge, double voxel_mm, std::vector<Spot>& out) {
+void find_crossings(const Window& window, Vec3i origin, int edge, double voxel_mm, const SampleRange* range,
+                    std::vector<Spot>& out) {
   const std::array<std::size_t, 3> stride = window.stride();
   for (int x = origin.x; x < origin.x + edge; ++x) {
     for (int y = origin.y; y < origin.y + edge; ++y) {
       const float* row = window.row({x, y, origin.z});
       for (int z = 0; z < edge; ++z) {
+        if (range != nullptr && !range->holds({x, y, origin.z + z})) continue;
         const float* a = row + z;
         for (int axis = 0; axis < 3; ++axis) {
           const auto k = static_cast<std::size_t>(axis);
@@ -124,12 +129,13 @@ void find_crossings(const Window& window, Vec3i origin, int edge, double voxel_m
   }
 }
 
-Scan scan_tile(const Solid& solid, const Shape& lumen, const ScanLimits& limits, Vec3i origin, const Tiles& tiles) {
+Scan scan_tile(const Solid& solid, const Shape& lumen, const ScanLimits& limits, Vec3i origin, const Tiles& tiles,
+               const SampleRange* range) {
   const double h = solid.grid().voxel_mm;
   const Window window(solid, {origin.x - tiles.margin, origin.y - tiles.margin, origin.z - tiles.margin},
                       tiles.edge + 2 * tiles.margin);
   std::vector<Spot> spots;
-  find_crossings(window, origin, tiles.edge, h, spots);
+  find_crossings(window, origin, tiles.edge, h, range, spots);
   std::vector<Vec3d> feet;
   for (const Spot& spot : spots) feet.push_back(spot.foot_mm);
   std::vector<float> depth(spots.size());
@@ -150,7 +156,7 @@ Scan scan_tile(const Solid& solid, const Shape& lumen, const ScanLimits& limits,
   for (std::size_t i = 0; i < spots.size(); ++i) {
     if (limits.wall_mm > 0) probe(spots[i], true, limits.wall_mm, found.walls);
     if (!(depth[i] < 0)) continue;
-    found.lumen_mm2 += spots[i].area_mm2;
+    found.lumen_mm2 += std::nearbyint(spots[i].area_mm2 * exact_mm2) / exact_mm2;
     if (limits.gap_mm > 0) probe(spots[i], false, limits.gap_mm, found.gaps);
     if (-dot(spots[i].normal, limits.up) > limits.steep_sine) found.steep.push_back(spots[i]);
   }
@@ -190,26 +196,39 @@ std::vector<std::size_t> patch_numbers(const std::vector<Spot>& spots) {
 
 }  // namespace
 
-Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, const Context& context) {
-  const Tiles tiles = tiles_of(solid, std::max(limits.wall_mm, limits.gap_mm) / solid.grid().voxel_mm);
+Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, const Context& context,
+          const SampleRange* range) {
+  Tiles tiles = tiles_of(solid, std::max(limits.wall_mm, limits.gap_mm) / solid.grid().voxel_mm);
+  if (range != nullptr) {
+    std::erase_if(tiles.origins, [&](Vec3i o) {
+      const int at = range->axis == 0 ? o.x : range->axis == 1 ? o.y : o.z;
+      return at >= range->high || at + tiles.edge <= range->low;
+    });
+  }
   std::vector<Scan> parts(tiles.origins.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, parts.size(), 1), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, parts.size(), 1), [&](const auto& some) {
     if (context.cancelled()) return;
-    for (std::size_t i = range.begin(); i < range.end(); ++i)
-      parts[i] = scan_tile(solid, lumen, limits, tiles.origins[i], tiles);
+    for (std::size_t i = some.begin(); i < some.end(); ++i)
+      parts[i] = scan_tile(solid, lumen, limits, tiles.origins[i], tiles, range);
   });
   context.check();
   Scan all;
-  const auto append = [](std::vector<Spot>& to, const std::vector<Spot>& from) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  for (const Scan& part : parts) {
-    append(all.walls, part.walls);
-    append(all.gaps, part.gaps);
-    append(all.steep, part.steep);
-    all.lumen_mm2 += part.lumen_mm2;
-  }
+  for (const Scan& part : parts) add(all, part);
   return all;
+}
+
+void add(Scan& to, const Scan& from) {
+  to.walls.insert(to.walls.end(), from.walls.begin(), from.walls.end());
+  to.gaps.insert(to.gaps.end(), from.gaps.begin(), from.gaps.end());
+  to.steep.insert(to.steep.end(), from.steep.begin(), from.steep.end());
+  to.lumen_mm2 += from.lumen_mm2;
+}
+
+void sort_spots(std::vector<Spot>& spots) {
+  const auto key = [](const Spot& s) {
+    return std::tuple(s.at.x, s.at.y, s.at.z, s.foot_mm.x, s.foot_mm.y, s.foot_mm.z);
+  };
+  std::stable_sort(spots.begin(), spots.end(), [&](const Spot& a, const Spot& b) { return key(a) < key(b); });
 }
 
 void drop_small_patches(std::vector<Spot>& spots, double least_mm2) {

@@ -34,7 +34,13 @@ struct Scan {
 /// distances. `lumen` is negative where gaps and steep faces matter. Areas are right for planes at any angle. Cost:
 /// O(samples near the surface * wall / voxel), in tiles with a margin, parallel; the same bits on any number of
 /// threads.
-[[nodiscard]] Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, const Context& context);
+/// `range`: only edges of the lattice that start there; the solid must be known as far beyond it as the limits reach.
+[[nodiscard]] Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, const Context& context,
+                        const SampleRange* range = nullptr);
+/// Of several ranges: spots of all, and their areas summed without an error.
+void add(Scan& to, const Scan& from);
+/// By place: the order no longer tells in what ranges they were found.
+void sort_spots(std::vector<Spot>& spots);
 
 /// Spots that hang together (26 neighbours).
 struct Patch {

@@ -27,31 +27,45 @@ PrintFault fault(std::vector<Patch> patches) {
   return result;
 }
 
-}  // namespace
-
-Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up, const Context& context) {
+ScanLimits limits_of(const PrintParams& params, Vec3d up, double voxel_mm) {
   if (!(params.wall_mm > 0 && params.gap_mm > 0))
     throw Error(Code::BadRecipe, "walls and gaps need a least width above 0", "print");
   if (!(params.overhang_deg >= 0 && params.overhang_deg <= 90))
     throw Error(Code::BadRecipe, "an overhang lies between 0 and 90 degrees", "print.overhang_deg");
-  const double voxel = solid.grid().voxel_mm, tolerance = 0.25 * voxel;
-  const double steepest = std::min(params.overhang_deg + 5, 90.0);
-  Scan found = scan(solid, lumen,
-                    {.wall_mm = params.wall_mm - tolerance,
-                     .gap_mm = params.gap_mm - tolerance,
-                     .up = normalized(up),
-                     .steep_sine = std::sin(steepest * std::numbers::pi / 180)},
-                    context);
-  const double noise_mm2 = 4 * voxel * voxel;
+  const double tolerance = 0.25 * voxel_mm, steepest = std::min(params.overhang_deg + 5, 90.0);
+  return {.wall_mm = params.wall_mm - tolerance,
+          .gap_mm = params.gap_mm - tolerance,
+          .up = normalized(up),
+          .steep_sine = std::sin(steepest * std::numbers::pi / 180)};
+}
+
+}  // namespace
+
+void drop_noise(Scan& found, const PrintParams& params, double voxel_mm) {
+  const double noise_mm2 = 4 * voxel_mm * voxel_mm;
+  for (std::vector<Spot>* spots : {&found.walls, &found.gaps, &found.steep}) sort_spots(*spots);
   drop_small_patches(found.walls, noise_mm2);
   drop_small_patches(found.gaps, std::max(noise_mm2, 8 * params.gap_mm * params.gap_mm));
   drop_small_patches(found.steep, noise_mm2);
+}
+
+Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up, const Context& context) {
+  Scan found = scan(solid, lumen, limits_of(params, up, solid.grid().voxel_mm), context);
+  drop_noise(found, params, solid.grid().voxel_mm);
   return found;
+}
+
+Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up, const SampleRange& range,
+                const Context& context) {
+  return scan(solid, lumen, limits_of(params, up, solid.grid().voxel_mm), context, &range);
 }
 
 Printable printable(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up, double node_mm,
                     const Context& context) {
-  const Scan found = print_scan(solid, lumen, params, up, context);
+  return summed(print_scan(solid, lumen, params, up, context), up, node_mm);
+}
+
+Printable summed(const Scan& found, Vec3d up, double node_mm) {
   Printable result;
   result.lumen_mm2 = found.lumen_mm2;
   result.thin_walls = fault(patches(found.walls, up));

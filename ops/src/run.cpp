@@ -144,6 +144,14 @@ Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fi
   return assemble(body, filled, shapes, params);
 }
 
+double node_mm(const std::vector<Fill>& fills, const PrintParams& limits) {
+  double most = 2 * limits.wall_mm;
+  for (const Fill& fill : fills) most = std::max(most, fill.ball_mm);
+  return most;
+}
+
+Shape printed_lumen(const Shape& body, double shell_mm) { return offset(body, -0.5 * shell_mm); }
+
 Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
                           const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe, bool fix,
                           Report& report, const Context& context) {
@@ -159,10 +167,8 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
     around.keep_out = capsules(shapes(out.drains));
     out.tied = trim(out.tied, body, sticks, shell_mm, around, context);
   }
-  double node_mm = 2 * limits.wall_mm;
-  for (const Fill& fill : fills) node_mm = std::max(node_mm, fill.ball_mm);
-  const Shape lumen = offset(distance_to(body), -0.5 * shell_mm);
-  report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm, context);
+  const Shape lumen = printed_lumen(distance_to(body), shell_mm);
+  report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm(fills, limits), context);
   report.print.checked = true;
   report.print.drains = out.drains;
   report.print.thickened = static_cast<std::int64_t>(out.thickened.size());

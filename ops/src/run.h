@@ -81,6 +81,10 @@ struct Design {
 /// The printed solid as a function: the composed shape with its ties and mends, put right wherever a sample of the
 /// solid says otherwise (specks that went, pores that were filled).
 [[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made, const Context& context);
+/// How far a steep face may reach to be the underside of a node.
+[[nodiscard]] double node_mm(const std::vector<Fill>& fills, const PrintParams& limits);
+/// Where gaps and steep faces matter to a printer.
+[[nodiscard]] Shape printed_lumen(const Shape& body, double shell_mm);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
                                         const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe,

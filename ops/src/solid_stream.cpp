@@ -12,6 +12,7 @@
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
 #include "fibrolite/winding.h"
+#include "print_limits.h"
 #include "run.h"
 
 namespace fibrolite {
@@ -201,6 +202,11 @@ struct SolidStream::Impl {
     body_vox += slab.body.volume_vox(slab.range);
     solid_vox += slab.solid.volume_vox(slab.range);
     active_voxels += slab.solid.active_voxels(slab.range);
+    if (design.recipe.print.check) {
+      const Shape lumen = printed_lumen(distance_to(slab.body), shell_mm);
+      add(faults,
+          print_scan(slab.solid, lumen, design.recipe.print, design.recipe.verify.up, slab.range, quiet(context)));
+    }
   }
 
   void finish(Report& report) const {
@@ -214,8 +220,12 @@ struct SolidStream::Impl {
     report.solid.active_voxels = active_voxels;
     report.solid.voxel_mm = h;
     report_solid(made.tied, design.fills, body_vox * h * h * h, solid_vox * h * h * h, design.recipe.material, report);
-    if (design.recipe.print.check)
-      report.warnings.emplace_back("the print checks were left out: they need the whole solid in memory");
+    if (const PrintParams& limits = design.recipe.print; limits.check) {
+      Scan all = faults;
+      drop_noise(all, limits, h);
+      report.print.found = summed(all, design.recipe.verify.up, node_mm(design.fills, limits));
+      report.print.checked = true;
+    }
     if (made.tied.dangling > 0) {
       report.warnings.push_back(
           std::to_string(made.tied.dangling) +
@@ -234,6 +244,7 @@ struct SolidStream::Impl {
   std::vector<PartSums> sums;
   double body_vox = 0, solid_vox = 0;
   std::int64_t active_voxels = 0;
+  Scan faults;
 };
 
 const SlabPlan& SolidStream::plan() const { return impl_->plan; }

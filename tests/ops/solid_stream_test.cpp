@@ -65,6 +65,13 @@ void expect_same_function(const SolidStream::Slab& slab, const Shape& whole, con
   }
 }
 
+void expect_same(const PrintFault& a, const PrintFault& b) {
+  EXPECT_EQ(a.places, b.places);
+  EXPECT_EQ(a.area_mm2, b.area_mm2);
+  EXPECT_EQ(a.volume_mm3, b.volume_mm3);
+  EXPECT_EQ(a.least_mm, b.least_mm);
+}
+
 void expect_same_report(const Report& a, const Report& b) {
   EXPECT_EQ(a.model.volume_mm3, b.model.volume_mm3);
   EXPECT_EQ(a.model.repairs, b.model.repairs);
@@ -80,6 +87,12 @@ void expect_same_report(const Report& a, const Report& b) {
   EXPECT_EQ(a.solid.active_voxels, b.solid.active_voxels);
   EXPECT_EQ(a.solid.dangling, b.solid.dangling);
   EXPECT_EQ(a.solid.unreached, b.solid.unreached);
+  EXPECT_EQ(a.print.checked, b.print.checked);
+  expect_same(a.print.found.thin_walls, b.print.found.thin_walls);
+  expect_same(a.print.found.small_gaps, b.print.found.small_gaps);
+  expect_same(a.print.found.overhangs, b.print.found.overhangs);
+  EXPECT_EQ(a.print.found.lumen_mm2, b.print.found.lumen_mm2);
+  EXPECT_EQ(a.print.found.node_overhang_mm2, b.print.found.node_overhang_mm2);
   ASSERT_EQ(a.parts.size(), b.parts.size());
   for (std::size_t i = 0; i < a.parts.size(); ++i) {
     EXPECT_EQ(a.parts[i].volume_mm3, b.parts[i].volume_mm3);
@@ -142,7 +155,7 @@ TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {
     EXPECT_LE(plan.memory_bytes, bytes);
     EXPECT_LT(plan.borders.size(), last);
     last = plan.borders.size();
-    EXPECT_EQ(plan.margin_vox, 16);
+    EXPECT_EQ(plan.margin_vox, 16);  // 1 mm
     EXPECT_LT(plan.borders.front() * h, bounds(mesh).min.z - 3 * h);
     EXPECT_GT(plan.borders.back() * h, bounds(mesh).max.z + 3 * h);
     EXPECT_TRUE(std::is_sorted(plan.borders.begin(), plan.borders.end()));

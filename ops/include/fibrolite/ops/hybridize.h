@@ -27,7 +27,7 @@ struct HybridizeParams {
   bool fix = false;                ///< Mend what the print checks find (mend.h).
   bool steps = false;              ///< Also realize every step as a grid of its own.
   bool function = false;           ///< Also give the solid as a distance function (Hybrid::printed).
-  /// Make no solid but one that comes slab by slab (Hybrid::stream). No mending, print checks, steps nor function.
+  /// Make no solid but one that comes slab by slab (Hybrid::stream). No mending, steps nor function.
   std::optional<SlabPlan> slabs{};
 };
 struct Hybrid {
