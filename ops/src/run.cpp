@@ -215,7 +215,7 @@ struct Retouched final : Shape::Function {
 
 Shape as_function(const Shape& whole, const Solid& body, const Mended& mended, const Context& context) {
   const Shape b = distance_to(body), solid = distance_to(mended.tied.solid);
-  const Shape made = with_mends(whole, b, mended);
+  Shape made = with_mends(whole, b, mended);
 
   // Samples on which function and solid differ: a ball about each, which covers the cells around it.
   struct Differing {

@@ -30,7 +30,7 @@ class Run {
   }
   /// For what times its own stages.
   Context part(const char* name, double until) {
-    const Context mine = context_.part(from_, until, name);
+    Context mine = context_.part(from_, until, name);
     from_ = until;
     context_.check();
     return mine;
