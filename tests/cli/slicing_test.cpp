@@ -116,7 +116,8 @@ TEST(Slicing, LessMemoryGivesTheSameBytesSlabBySlab) {
   sliced(slabs, {"--max-memory", "250M"});
   EXPECT_TRUE(content(whole / "molar.zip") == content(slabs / "molar.zip"));
   json a = report_in(whole / "molar.report.json"), b = report_in(slabs / "molar.report.json");
-  for (const char* block : {"model", "parts", "interfaces", "solid", "print", "slices"}) EXPECT_EQ(a[block], b[block]) << block;
+  for (const char* block : {"model", "parts", "interfaces", "solid", "print", "slices"})
+    EXPECT_EQ(a[block], b[block]) << block;
   for (const json& stage : b["stages"]) EXPECT_LE(stage["peak_rss_mb"], 250 * 1.048576);
 }
 
