@@ -6,6 +6,7 @@
 #include <functional>
 #include <utility>
 
+#include "fibrolite/blocks.h"
 #include "fibrolite/ops/assemble.h"
 #include "fibrolite/ops/measure.h"
 #include "fibrolite/ops/stance.h"
@@ -107,7 +108,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   if (params.function) {
     const Shape smooth =
         compose(smooth_distance_to(body), out.parts, fills, out.joints, params.infill, recipe, assembly);
-    out.printed = as_function(smooth, body, mended, context);
+    out.printed = as_function(smooth, body, mended, blocks(body), context);
   }
   if (params.steps) out.steps = steps(body, raw, out, fills, mended, assembly);
   return out;

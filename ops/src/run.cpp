@@ -213,7 +213,8 @@ struct Retouched final : Shape::Function {
 
 }  // namespace
 
-Shape as_function(const Shape& whole, const Solid& body, const Mended& mended, const Context& context) {
+Shape as_function(const Shape& whole, const Solid& body, const Mended& mended, const std::vector<Vec3i>& origins,
+                  const Context& context) {
   const Shape b = distance_to(body), solid = distance_to(mended.tied.solid);
   Shape made = with_mends(whole, b, mended);
 
@@ -223,7 +224,6 @@ Shape as_function(const Shape& whole, const Solid& body, const Mended& mended, c
   };
   const double voxel = body.grid().voxel_mm, radius = 0.5 * std::numbers::sqrt3 * voxel;
   const auto rounding = static_cast<float>(1e-3 * voxel);
-  const std::vector<Vec3i> origins = blocks(body);
   std::vector<Differing> differing(origins.size());
   for_each_block(origins, voxel, [&](std::size_t number, const PointBlock& block) {
     context.check();

@@ -80,7 +80,9 @@ struct Design {
                             const AssembleParams& params);
 /// The printed solid as a function: the composed shape with its ties and mends, put right wherever a sample of the
 /// solid says otherwise (specks that went, pores that were filled).
-[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made, const Context& context);
+/// `origins`: blocks where that may be.
+[[nodiscard]] Shape as_function(const Shape& whole, const Solid& body, const Mended& made,
+                                const std::vector<Vec3i>& origins, const Context& context);
 /// How far a steep face may reach to be the underside of a node.
 [[nodiscard]] double node_mm(const std::vector<Fill>& fills, const PrintParams& limits);
 /// Where gaps and steep faces matter to a printer.

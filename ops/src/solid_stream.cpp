@@ -190,7 +190,11 @@ struct SolidStream::Impl {
     if (!measured[number]) measure(number, result, context);
     Mended mended = made;
     mended.tied.solid = result.solid;
-    result.printed = as_function(over(smooth_distance_to(result.body)), result.body, mended, context);
+    std::vector<Vec3i> changed;
+    const SampleRange known{plan.axis, result.range.low - plan.margin_vox, result.range.high + plan.margin_vox};
+    for (const Flips::Block& block : found.flips.blocks)
+      if (known.holds(block.origin)) changed.push_back(block.origin);
+    result.printed = as_function(over(smooth_distance_to(result.body)), result.body, mended, changed, context);
     return result;
   }
 
