@@ -248,7 +248,7 @@ const std::vector<Field>& table() {
       field("tcs.rotate_deg", &R::tcs, &TcsParams::rotate_deg, {-360, 360},
             "turns of the lattice about its origin: about world x, then y, then z"),
       field("tcs.stretch_z", &R::tcs, &TcsParams::stretch_z,
-            "cells taller by sqrt(2): sticks at 45 degrees, printable without support"),
+            "cells taller by sqrt(2) upward (--up): sticks at 45 degrees, printable without support"),
       field("tcs.grade", &R::tcs, &TcsParams::grade,
             "where members are thicker: nowhere, toward the surface, or where the body carries more"),
       field("tcs.grade_least", &R::tcs, &TcsParams::grade_least, {0.01, 10},

@@ -73,8 +73,11 @@ std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& 
 Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
           const std::optional<Shape>& thickness) {
   switch (infill_of(part, run)) {
-    case PartInfill::Tcs:
-      return thickness ? generate(part, recipe.tcs, *thickness) : generate(part, recipe.tcs);
+    case PartInfill::Tcs: {
+      TcsParams tcs = recipe.tcs;
+      tcs.up = recipe.verify.up;
+      return thickness ? generate(part, tcs, *thickness) : generate(part, tcs);
+    }
     case PartInfill::Mfs:
       return generate(part, recipe.mfs, body, recipe.shell.thickness_mm);
     case PartInfill::Gyroid:

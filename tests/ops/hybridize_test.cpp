@@ -121,6 +121,20 @@ TEST(Hybridize, a_turned_model_gives_the_same_parts) {
   }
 }
 
+/// A rounded cube is the same whichever way is up: so is what leans over in it.
+TEST(Hybridize, the_crystal_of_the_preset_fdm_stands_the_way_it_is_printed) {
+  const Mesh mesh = model("rounded_box");
+  const auto crystal = [&](Vec3d up) {
+    HybridizeParams params{.recipe = preset("fdm"), .infill = InfillKind::Tcs, .voxel_mm = 0.4};
+    params.recipe.verify.up = up;
+    return hybridized(mesh, params).report;
+  };
+  const Report upright = crystal({0, 0, 1}), across = crystal({0, 1, 0});
+  EXPECT_NEAR(across.print.found.overhangs.area_mm2 / upright.print.found.overhangs.area_mm2, 1, 0.05);
+  EXPECT_NEAR(across.print.found.node_overhang_mm2 / upright.print.found.node_overhang_mm2, 1, 0.25);
+  EXPECT_NEAR(across.solid.volume_mm3 / upright.solid.volume_mm3, 1, 0.02);
+}
+
 TEST(Hybridize, the_steps_united_by_openvdb_are_the_fused_solid) {
   const Outcome out = hybridized(model("cylinder_on_box"), {.recipe = sturdy(), .voxel_mm = 0.5, .steps = true});
   std::map<std::string, Solid> step;

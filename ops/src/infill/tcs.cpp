@@ -125,10 +125,11 @@ Frame lattice(const TcsParams& p) {
     v = {std::cos(b) * v.x + std::sin(b) * v.z, v.y, std::cos(b) * v.z - std::sin(b) * v.x};
     return Vec3d{std::cos(c) * v.x - std::sin(c) * v.y, std::sin(c) * v.x + std::cos(c) * v.y, v.z};
   };
-  return {p.shift_mm, turned({1, 0, 0}), turned({0, 1, 0}), turned({0, 0, 1})};
+  const Frame stands = p.stretch_z && !(p.up == Vec3d{0, 0, 1}) ? frame_along({}, p.up) : Frame{};
+  return {p.shift_mm, turned(stands.x), turned(stands.y), turned(stands.z)};
 }
 
-bool is_turned(const TcsParams& p) { return !(p.rotate_deg == Vec3d{}); }
+bool is_turned(const TcsParams& p) { return !(p.rotate_deg == Vec3d{}) || (p.stretch_z && !(p.up == Vec3d{0, 0, 1})); }
 
 Shape in_lattice(const TcsParams& p, Vec3d shift) {
   const CellEdges cell = cell_of(p);
@@ -207,6 +208,7 @@ void check(const TcsParams& p) {
   if (!(p.cell_mm.least() >= times * members(p).most_mm * (1 - 1e-12)))
     refuse(sheet ? "the cell is too small for its walls" : "the cell is too small for its sticks", "tcs.cell_mm",
            "use " + number_text(times) + " times " + key + " or more");
+  if (p.stretch_z && !(norm(p.up) > 0)) refuse("up must be a direction", "tcs.stretch_z");
   if (p.grade == TcsGrade::None) return;
   if (!(p.grade_least > 0) || !(p.grade_most >= p.grade_least))
     refuse("must be above zero, and grade_most no less", "tcs.grade_least");

@@ -312,7 +312,7 @@ TEST(Graded, is_thickest_under_the_shell_and_thinnest_deep_inside) {
   EXPECT_NEAR(members(p).most_mm, 1.28, 1e-12);
 }
 
-/// How far the surface leans over, as its normal's downward part, worst over points farther than `from_node` from
+/// How far the surface leans over, as its normal's part against `p.up`, worst over points farther than `from_node` from
 /// nodes.
 double worst_overhang(const TcsParams& p, double from_node) {
   const Shape shape = crystal(p);
@@ -334,7 +334,7 @@ double worst_overhang(const TcsParams& p, double from_node) {
     }
     if (std::abs(shape(at)) > 1e-3) continue;
     if (std::none_of(nodes.begin(), nodes.end(), [&](Vec3d n) { return norm(n - at) < from_node; }))
-      worst = std::max(worst, -normal.z);
+      worst = std::max(worst, -dot(normal, normalized(p.up)));
   }
   return worst;
 }
@@ -344,13 +344,15 @@ TEST(Overhang, stretched_sticks_lean_45_degrees_and_no_more_but_at_nodes) {
   const double near = 0.5 * cubic.ball_mm + 0.1;
   EXPECT_NEAR(worst_overhang(tall, near), std::cos(pi / 4), 0.01);       // the underside of a stick at 45 degrees
   EXPECT_NEAR(worst_overhang(cubic, near), std::sqrt(2.0 / 3.0), 0.01);  // at 35.3 degrees
+  for (const Vec3d up : {Vec3d{1, 0, 0}, Vec3d{0, -1, 0}, Vec3d{0, 0, -1}, Vec3d{1, -2, 3}})
+    EXPECT_NEAR(worst_overhang({.stretch_z = true, .up = up}, near), std::cos(pi / 4), 0.01);
 }
 
 TEST(Crystal, bad_sizes_are_refused) {
   for (const TcsParams& p :
        {TcsParams{.stick_mm = 0}, TcsParams{.ball_mm = 0.5}, TcsParams{.cell_mm = 3}, TcsParams{.cell_mm = {6, 6, 19}},
-        TcsParams{.cell_mm = {-6, 6, 6}}, TcsParams{.form = TcsForm::Sheet, .wall_mm = 1.6},
-        TcsParams{.grade = TcsGrade::Surface, .grade_depth_mm = 5},
+        TcsParams{.cell_mm = {-6, 6, 6}}, TcsParams{.stretch_z = true, .up = {}},
+        TcsParams{.form = TcsForm::Sheet, .wall_mm = 1.6}, TcsParams{.grade = TcsGrade::Surface, .grade_depth_mm = 5},
         TcsParams{.grade = TcsGrade::Surface, .grade_least = 3}}) {
     try {
       (void)crystal(p);

@@ -41,6 +41,7 @@ struct TcsParams {
   Vec3d shift_mm{};        ///< Lattice origin, world axes.
   Vec3d rotate_deg{};      ///< Turns about the origin: about world x, then y, then z.
   bool stretch_z = false;  ///< Cell taller by sqrt(2) along its z: of a cube, sticks at 45 degrees, self-supporting.
+  Vec3d up{0, 0, 1};       ///< Which way it is printed: if stretched, z of the cell before rotate_deg turns it.
   TcsGrade grade = TcsGrade::None;
   double grade_least = 1;   ///< If graded, thickness of all members is multiplied by this deep inside, or idle...
   double grade_most = 1.5;  ///< ...and by this at the inner face of the shell, or at full stress; grade_least or more.
