@@ -163,7 +163,13 @@ struct PieceSweep::Impl {
   }
 
   void remember(const Coord& origin, const LeafLabels* labels, const std::vector<Id>& id) {
-    if (labels == nullptr) return;  // a whole block is never few
+    if (labels == nullptr) {  // one value for all
+      if (id[0] == exterior || sets[id[0]].voxels >= few) return;
+      Flips::Block& block = sets[id[0]].samples.emplace_back();
+      block.origin = {origin.x(), origin.y(), origin.z()};
+      block.tile = true;
+      return;
+    }
     for (std::size_t k = 0; k < id.size(); ++k) {
       Set& set = sets[id[k]];
       if (id[k] == exterior || set.voxels >= few) continue;
@@ -281,8 +287,12 @@ Solid flipped(const Solid& solid, const Flips& flips) {
   openvdb::FloatGrid::Ptr grid;
   for (const Flips::Block& block : flips.blocks) {
     const Coord origin(block.origin.x, block.origin.y, block.origin.z);
-    if (from.probeConstLeaf(origin) == nullptr) continue;
+    if (!block.tile && from.probeConstLeaf(origin) == nullptr) continue;
     if (grid == nullptr) grid = solid.impl().grid->deepCopy();
+    if (block.tile) {
+      grid->tree().addTile(1, origin, -from.getValue(origin), false);
+      continue;
+    }
     float* values = grid->tree().probeLeaf(origin)->buffer().data();
     for (std::size_t i = 0; i < LeafLabels::size; ++i)
       if ((block.which[i >> 6] >> (i & 63U) & 1U) != 0) values[i] = -values[i];

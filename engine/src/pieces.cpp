@@ -10,13 +10,12 @@
 #include <utility>
 
 #include "components.h"
+#include "fibrolite/piece_sweep.h"
 #include "nearest_way.h"
 
 namespace fibrolite {
 namespace {
 
-using Tree = Components::Tree;
-using Leaf = Components::Leaf;
 using Id = Components::Id;
 
 /// The largest material component, the one that is never loose.
@@ -98,52 +97,14 @@ int VoidMap::at(Vec3i sample) const {
 }
 
 CleanResult clean(const Solid& solid, const CleanParams& params, const Context& context) {
-  CleanResult result{solid, 0, 0, {}};
-  const Components components(solid, context);
-  if (components.empty()) return result;
-  auto list = components.list();
-  const Id keep = main_piece(list);
-  std::vector<Id> flip;
-  std::vector<Components::Component> left;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const auto& c = list[i];
-    const bool drop = c.inside && c.id != keep && c.voxels < params.drop_below_vox;
-    const bool fill = !c.inside && i > 0 && c.voxels < params.fill_below_vox;
-    result.dropped += drop ? 1 : 0;
-    result.filled += fill ? 1 : 0;
-    if (drop || fill) {
-      flip.push_back(c.id);
-    } else {
-      left.push_back(c);
-    }
-  }
-  result.left = summarize(left, solid.grid().voxel_mm);
-  if (flip.empty()) return result;
-
-  std::sort(flip.begin(), flip.end());
-  auto grid = solid.impl().grid->deepCopy();
-  Tree& tree = grid->tree();
-  components.each_block([&](const openvdb::Coord& origin, const LeafLabels* labels, Id offset) {
-    const auto flipped = [&](Id local) {
-      return std::binary_search(flip.begin(), flip.end(), components.find(offset + local));
-    };
-    if (labels == nullptr) {
-      if (flipped(0)) tree.addTile(1, origin, -tree.getValue(origin), false);
-      return;
-    }
-    std::vector<bool> which(labels->voxels.size());
-    bool any = false;
-    for (std::size_t k = 0; k < which.size(); ++k) {
-      which[k] = flipped(static_cast<Id>(k));
-      any = any || which[k];
-    }
-    if (!any) return;
-    float* values = tree.probeLeaf(origin)->buffer().data();
-    for (std::size_t v = 0; v < Leaf::SIZE; ++v) {
-      if (which[labels->label[v]]) values[v] = -values[v];
-    }
-  });
-  result.solid = make_solid(grid, solid.grid());
+  openvdb::CoordBBox box;
+  solid.impl().grid->tree().evalActiveVoxelBoundingBox(box);
+  if (box.empty()) return {solid, 0, 0, {}};
+  // One slab that holds all of it.
+  PieceSweep sweep(solid.grid(), {.axis = 0, .clean = params});
+  sweep.add(solid, (box.min().x() & ~7) - 8, (box.max().x() | 7) + 9, nothing(), context);
+  PieceSweep::Result found = sweep.finish();
+  CleanResult result{flipped(solid, found.flips), found.dropped, found.filled, std::move(found.left)};
   // A void that was filled may have been all that kept two pieces apart.
   if (result.filled > 0 && result.left.material.size() > 1) result.left = pieces(result.solid, context);
   return result;

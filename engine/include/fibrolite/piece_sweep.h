@@ -18,6 +18,7 @@ struct Flips {
   struct Block {
     Vec3i origin{};                        ///< A multiple of 8.
     std::array<std::uint64_t, 8> which{};  ///< Bit 8 y + z of word x: sample origin + (x, y, z).
+    bool tile = false;                     ///< One value stands for all of them.
   };
   std::vector<Block> blocks;  ///< Sorted by origin, x first; each once.
 };
@@ -31,7 +32,7 @@ class PieceSweep {
     int axis = 2;          ///< Along which the slabs follow each other.
     bool falling = false;  ///< From high to low.
     double below = 0;      ///< Material is what reads less than this, mm; 0 or negative, within the band.
-    CleanParams clean{.drop_below_vox = 0, .fill_below_vox = 0};  ///< Up to 512: less than a whole block.
+    CleanParams clean{.drop_below_vox = 0, .fill_below_vox = 0};  ///< In several slabs up to 512, a block.
   };
   PieceSweep(Grid grid, const Params& params);
   /// The next slab: the blocks of 8 with low <= sample[axis] < high; both multiples of 8, each slab next to the one
