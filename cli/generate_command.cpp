@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "exit_codes.h"
 #include "fibrolite/mesh_io.h"
+#include "fibrolite/mesh_layers.h"
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
@@ -20,6 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool is_vdb(const fs::path& file) { return file.extension() == ".vdb" || file.extension() == ".VDB"; }
+
 struct GenerateOptions {
   ModelOptions model;
   RecipeOptions recipe;
@@ -31,6 +34,15 @@ struct GenerateOptions {
   std::optional<fs::path> steps;
   bool fix = false;
 
+  /// What cannot be made slab by slab; empty if all can.
+  [[nodiscard]] std::string needs_whole(const Recipe& made_by) const {
+    for (const fs::path& file : output.files)
+      if (is_vdb(file)) return file.filename().string();
+    if (steps) return "--steps";
+    if (!pictures.files.empty()) return "--picture";
+    if (fix) return "--fix";
+    return made_by.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "";
+  }
   [[nodiscard]] std::vector<fs::path> targets() const {
     std::vector<fs::path> all = output.files;
     all.insert(all.end(), pictures.files.begin(), pictures.files.end());
@@ -39,8 +51,6 @@ struct GenerateOptions {
     return all;
   }
 };
-
-bool is_vdb(const fs::path& file) { return file.extension() == ".vdb" || file.extension() == ".VDB"; }
 
 /// Of a file: what its format takes for a triangle and half a vertex, or a voxel; compressed files as measured.
 double expected_bytes(const fs::path& file, const Prediction& expected) {
@@ -60,8 +70,10 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
   const Prediction expected = predict(model.mesh, *params.voxel_mm, params.recipe, params.infill);
   text += "solid     about " + number_text(expected.active_voxels / 1e6, 2) + " million voxels, a mesh of " +
           number_text(expected.triangles / 1e6, 2) + " million triangles\n";
-  text += "memory    about " + memory_text(expected.memory_bytes) + " of " + memory_text(options.run.allowed_bytes()) +
-          "\n";
+  text += "memory    about " + memory_text(params.slabs ? params.slabs->memory_bytes : expected.memory_bytes) + " of ";
+  text += memory_text(options.run.allowed_bytes());
+  if (params.slabs) text += ", in " + std::to_string(params.slabs->borders.size() - 1) + " slabs";
+  text += "\n";
   for (const fs::path& file : options.output.files)
     text += "output    " + file.string() + ", about " + memory_text(expected_bytes(file, expected)) + "\n";
   text += "output    " + options.output.report_path().string() + "\n";
@@ -80,6 +92,28 @@ PointColor colors(const Hybrid& hybrid, double shell_mm) {
     if (joints(p) <= 0) return joint_color;
     return by_part.at(static_cast<std::size_t>(labels.label(p)));
   };
+}
+
+int longest_axis(const Box3d& box) {
+  const Vec3d size = box.size();
+  return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+}
+
+/// Of the solid, or of slab after slab.
+void make_surface(Hybrid& hybrid, SurfaceLayers& layers, Report& report, const Context& context) {
+  if (hybrid.stream) {
+    SolidStream& stream = *hybrid.stream;
+    const auto count = static_cast<double>(stream.slabs());
+    for (std::size_t i = 0; i < stream.slabs(); ++i) {
+      const auto n = static_cast<double>(i);
+      const SolidStream::Slab slab = stream.slab(i, context.part(n / count, (n + 0.7) / count, "solid"));
+      layers.add(slab.solid, slab.range, context.part((n + 0.7) / count, (n + 1) / count, "surface"));
+    }
+    stream.finish(report);
+  } else {
+    layers.add(hybrid.solid, context);
+  }
+  layers.finish(report.solid.volume_mm3);
 }
 
 void generate(const GenerateOptions& options) {
@@ -104,10 +138,13 @@ void generate(const GenerateOptions& options) {
   params.recipe.verify.loads = with_paint(std::move(params.recipe.verify.loads), model.painted);
   params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
   check_recipe(params.recipe, *params.voxel_mm, options.infill);
-  check_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run);
+  const int axis = longest_axis(bounds(model.mesh));
+  params.slabs = fit_into_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
+                                 {.axis = axis, .margin_mm = 8 * *params.voxel_mm, .surface = true}, 0,
+                                 options.needs_whole(params.recipe));
   if (options.run.dry_run) return print(plan(options, model, params));
 
-  // Each thing goes as soon as nothing needs it: at the end only the mesh and its check are in memory.
+  // Each thing goes as soon as nothing needs it: at the end only the surface and its check are in memory.
   Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.75, "fill"));
   model = {};
   if (options.pictures.files.empty()) hybrid.body = {};
@@ -117,9 +154,13 @@ void generate(const GenerateOptions& options) {
     if (options.steps) write_vdb(outputs.place(*options.steps), hybrid.steps, context.part(0.78, 0.8, "write"));
   });
   hybrid.steps.clear();
-  const Mesh mesh = stage("surface", [&] { return surface(hybrid.solid, {}, context.part(0.8, 0.88, "surface")); });
+  const auto scratch =
+      params.slabs ? std::optional(outputs.place(options.output.files.front()).parent_path()) : std::nullopt;
+  SurfaceLayers layers({.voxel_mm = *params.voxel_mm}, {.axis = axis}, scratch);
+  stage("surface", [&] { make_surface(hybrid, layers, report, context.part(0.8, 0.88, "surface")); });
   if (const auto& files = options.pictures.files; !files.empty()) {
     stage("picture", [&] {
+      const Mesh mesh = gathered(layers, context.part(0.88, 0.88, "picture"));
       const PointColor color = colors(hybrid, params.recipe.shell.thickness_mm);
       const double each = 0.04 / static_cast<double>(files.size());
       for (std::size_t i = 0; i < files.size(); ++i) {
@@ -131,11 +172,10 @@ void generate(const GenerateOptions& options) {
     });
   }
   hybrid = {};
-  report.mesh = stage("check mesh", [&] { return check(mesh); });
-  context.check();
+  report.mesh = stage("check mesh", [&] { return check(layers, context.part(0.92, 0.94, "check")); });
   stage("write mesh", [&] {
     for (const fs::path& file : options.output.files)
-      if (!is_vdb(file)) write_mesh(outputs.place(file), mesh, context.part(0.92, 1, "write"));
+      if (!is_vdb(file)) write_mesh(outputs.place(file), layers, context.part(0.94, 1, "write"));
   });
   job.finish(options.output.report_path());
   if (!options.run.quiet) print_summary(report, options.targets());

@@ -48,21 +48,41 @@ Model load_model(const ModelOptions& options, Report& report, const Context& con
   return model;
 }
 
-void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run) {
-  const auto needed = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes; };
-  const double allowed = run.allowed_bytes();
-  if (needed(voxel_mm) <= allowed) return;
-  const std::string what =
-      "the run would need about " + memory_text(needed(voxel_mm)) + " of memory, more than " + memory_text(allowed);
-  const std::string where = "voxel " + number_text(voxel_mm) + " mm";
+namespace {
+
+/// `needed`: bytes, by voxel; `why` follows what is said of them.
+[[noreturn]] void refuse(const Mesh& model, double voxel_mm, const std::function<double(double)>& needed,
+                         double allowed, const std::string& why) {
+  const std::string what = "the run would need about " + memory_text(needed(voxel_mm)) + " of memory, more than " +
+                           memory_text(allowed) + why;
   const double coarsest = bounds(model).longest_side();
   double fitting = voxel_mm;
   while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting *= 2;
   fitting = std::max(voxel_mm, fitting / 2);
   while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting = round_up(fitting * 1.05);
-  throw Error(Code::TooLarge, what, where,
+  throw Error(Code::TooLarge, what, "voxel " + number_text(voxel_mm) + " mm",
               fitting < coarsest ? "use --voxel " + number_text(fitting) + " or larger, or raise --max-memory"
                                  : "raise --max-memory");
+}
+
+}  // namespace
+
+void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run) {
+  const auto needed = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes; };
+  if (!(needed(voxel_mm) <= run.allowed_bytes())) refuse(model, voxel_mm, needed, run.allowed_bytes(), "");
+}
+
+std::optional<SlabPlan> fit_into_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill,
+                                        const RunOptions& run, const SlabNeeds& needs, double more_bytes,
+                                        const std::string& whole) {
+  const double allowed = run.allowed_bytes();
+  const auto as_whole = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes + more_bytes; };
+  if (as_whole(voxel_mm) <= allowed) return std::nullopt;
+  const auto plan = [&](double voxel) { return plan_slabs(model, voxel, recipe, infill, needs, allowed - more_bytes); };
+  const auto in_slabs = [&](double voxel) { return plan(voxel).memory_bytes + more_bytes; };
+  if (!whole.empty()) refuse(model, voxel_mm, as_whole, allowed, ", and " + whole + " needs the whole solid in it");
+  if (in_slabs(voxel_mm) > allowed) refuse(model, voxel_mm, in_slabs, allowed, " even slab by slab");
+  return plan(voxel_mm);
 }
 
 FoundParts find_parts(const Model& model, const Recipe& recipe, Report& report, const Context& context) {

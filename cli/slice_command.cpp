@@ -106,19 +106,6 @@ int axis_of(Up up) {
   return d.x != 0 ? 0 : d.y != 0 ? 1 : 2;
 }
 
-/// How the solid is cut if it is too large to be whole; what needs a whole one is refused.
-std::optional<SlabPlan> slabs_for(const SliceOptions& options, const Mesh& model, const HybridizeParams& params,
-                                  double layer_mm, double slicing_bytes) {
-  const double voxel = *params.voxel_mm, allowed = options.run.allowed_bytes();
-  if (predict(model, voxel, params.recipe, options.infill).memory_bytes + slicing_bytes <= allowed) return std::nullopt;
-  const double margin_mm = 0.5 * layer_mm + 4 * voxel;
-  SlabPlan plan = plan_slabs(model, voxel, params.recipe, options.infill, axis_of(options.model.up), margin_mm,
-                             allowed - slicing_bytes);
-  if (plan.memory_bytes + slicing_bytes > allowed || params.recipe.print.drain_mm.value_or(0) > 0)
-    check_memory(model, voxel, params.recipe, options.infill, options.run);
-  return plan;
-}
-
 /// Layers from slab after slab: those whose middle lies in it.
 std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, const Context& context) {
   return [stream, context](const SlicePlate& plate, int first) mutable {
@@ -132,7 +119,7 @@ std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, c
     const std::size_t slab = slab_of(first);
     int last = first + 1;
     while (last < plate.grid.layers && slab_of(last) == slab) ++last;
-    return LayerRun{last, stream.slab(slab, context).printed};
+    return LayerRun{last, stream.printed(stream.slab(slab, context), context)};
   };
 }
 
@@ -230,14 +217,17 @@ void slice_to_files(const SliceOptions& options) {
   const std::vector<SlicePlate> plates =
       make_plates(frame, source.box,
                   {options.layer_mm.value_or(0.05), options.pixel_mm.value_or(0.05), options.printer, options.tile});
+  check_plates(options, plates, source.memory);
   if (!options.from_solid()) {
-    params.slabs =
-        slabs_for(options, model.mesh, params, options.layer_mm.value_or(0.05), slicing_memory(plates.front().grid));
+    const double margin_mm = 0.5 * options.layer_mm.value_or(0.05) + 4 * *params.voxel_mm;
+    params.slabs = fit_into_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
+                                   {.axis = axis_of(options.model.up), .margin_mm = margin_mm},
+                                   slicing_memory(plates.front().grid),
+                                   params.recipe.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "");
     source.slabs = params.slabs;
     source.memory = params.slabs ? params.slabs->memory_bytes
                                  : predict(model.mesh, *params.voxel_mm, params.recipe, options.infill).memory_bytes;
   }
-  check_plates(options, plates, source.memory);
   if (options.run.dry_run) return print(plan(options, source, plates));
 
   std::optional<SolidStream> stream;

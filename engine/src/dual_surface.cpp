@@ -141,7 +141,7 @@ struct Block {
   std::array<std::uint16_t, Leaf::SIZE> first;  ///< Vertex of each mixed cell's first sheet, in the block.
   std::array<std::uint16_t, Leaf::SIZE> kind;   ///< 8 bits of corners inside, then the joined face.
   std::vector<openvdb::Vec3s> points;
-  std::vector<std::array<std::uint32_t, 4>> quads;
+  std::vector<Quad> quads;
   std::size_t base = 0;  ///< Of its vertices among all.
 };
 
@@ -298,7 +298,7 @@ struct DualSurface::Impl {
     return false;
   }
 
-  void add_layer(const Tree& tree, const Coord* from, const Coord* to, QuadSurface& out) {
+  [[nodiscard]] QuadLayer add_layer(const Tree& tree, const Coord* from, const Coord* to) {
     const auto count = static_cast<std::size_t>(to - from);
     Layer layer(count);
     const auto each = [&](const auto& work) {
@@ -323,23 +323,23 @@ struct DualSurface::Impl {
       throw Error(Code::TooLarge, "the surface has more vertices than a mesh can hold", {}, "use a larger --voxel");
     each([&](std::size_t i) { add_quads(layer, i); });
 
-    std::vector<std::size_t> quads{out.quads.size()};
+    std::vector<std::size_t> quads{0};
     for (const Block& block : layer) quads.push_back(quads.back() + block.quads.size());
-    const std::size_t offset = out.points.size();
-    out.points.resize(offset + (points - out_points));
+    QuadLayer out;
+    out.first = out_points;
+    out.points.resize(points - out_points);
     out.quads.resize(quads.back());
     each([&](std::size_t i) {
       Block& block = layer[i];
       std::copy(block.points.begin(), block.points.end(),
-                out.points.begin() + static_cast<std::ptrdiff_t>(offset + block.base - out_points));
+                out.points.begin() + static_cast<std::ptrdiff_t>(block.base - out_points));
       std::copy(block.quads.begin(), block.quads.end(), out.quads.begin() + static_cast<std::ptrdiff_t>(quads[i]));
       block.points = {};
       block.quads = {};
     });
     out_points = points;
-    out.layer_points.push_back(out.points.size());
-    out.layer_quads.push_back(out.quads.size());
     below = std::move(layer);
+    return out;
   }
 
   [[nodiscard]] const Block* find(const Layer& layer, const Coord& origin) const {
@@ -365,7 +365,7 @@ struct DualSurface::Impl {
       return static_cast<std::uint32_t>(in.base + in.first[at] + tables().sheets[kind & 255U][kind >> 8].of[e]);
     };
     const auto quad = [&](int x, int y, int z, unsigned along, bool inside) {
-      std::array<std::uint32_t, 4> q;
+      Quad q;
       constexpr std::array<unsigned, 4> circle{0, 1, 3, 2};  // bits for a step down along the next axes
       for (std::size_t k = 0; k < 4; ++k) {
         std::array<int, 3> cell{x, y, z};
@@ -399,27 +399,36 @@ struct DualSurface::Impl {
 DualSurface::DualSurface(Grid grid, int axis) : impl_(std::make_unique<Impl>(grid, axis)) {}
 DualSurface::~DualSurface() = default;
 
-void DualSurface::add(const Solid& solid, const SampleRange& range, QuadSurface& out, const Context& context) {
+void DualSurface::add(const Solid& solid, const SampleRange& range, const std::function<void(QuadLayer&&)>& use,
+                      const Context& context) {
   const Tree& tree = solid.impl().grid->tree();
   const std::vector<Coord> blocks = impl_->candidates(tree, range);
   for (std::size_t i = 0; i < blocks.size();) {
     context.check();
     std::size_t end = i;
     while (end < blocks.size() && blocks[end][impl_->axis] == blocks[i][impl_->axis]) ++end;
-    impl_->add_layer(tree, blocks.data() + i, blocks.data() + end, out);
+    use(impl_->add_layer(tree, blocks.data() + i, blocks.data() + end));
     i = end;
     context.progress(static_cast<double>(i) / static_cast<double>(blocks.size()));
   }
 }
 
-QuadSurface dual_surface(const Solid& solid, int axis, const Context& context) {
-  QuadSurface out;
+SampleRange surface_range(const Solid& solid, int axis) {
   openvdb::CoordBBox box;
   solid.impl().grid->tree().evalLeafBoundingBox(box);
-  if (box.empty()) return out;
+  if (box.empty()) return {axis, 0, 0};
   const auto a = static_cast<std::size_t>(axis);
-  DualSurface(solid.grid(), axis).add(solid, {axis, (box.min()[a] & ~7) - 8, (box.max()[a] | 7) + 1}, out, context);
-  return out;
+  return {axis, (box.min()[a] & ~7) - 8, (box.max()[a] | 7) + 1};
+}
+
+QuadLayer dual_surface(const Solid& solid, int axis, const Context& context) {
+  QuadLayer all;
+  const auto append = [&](QuadLayer&& layer) {
+    all.points.insert(all.points.end(), layer.points.begin(), layer.points.end());
+    all.quads.insert(all.quads.end(), layer.quads.begin(), layer.quads.end());
+  };
+  DualSurface(solid.grid(), axis).add(solid, surface_range(solid, axis), append, context);
+  return all;
 }
 
 }  // namespace fibrolite

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -14,10 +15,13 @@
 
 namespace fibrolite {
 
-struct QuadSurface {
-  std::vector<openvdb::Vec3s> points;                        ///< mm.
-  std::vector<std::array<std::uint32_t, 4>> quads;           ///< Counter-clockwise from outside.
-  std::vector<std::size_t> layer_points{0}, layer_quads{0};  ///< Where each layer of blocks begins, and the end.
+using Quad = std::array<std::uint32_t, 4>;  ///< Of vertices, counter-clockwise from outside.
+
+/// Of a layer of blocks.
+struct QuadLayer {
+  std::vector<openvdb::Vec3s> points;  ///< mm.
+  std::size_t first = 0;               ///< Number of its first vertex among all.
+  std::vector<Quad> quads;             ///< Of its vertices and those of the layer before.
 };
 
 /// Cells of eight neighbouring samples get a vertex for each sheet of the surface that runs through them: the mean of
@@ -33,17 +37,21 @@ class DualSurface {
   ~DualSurface();
   DualSurface(const DualSurface&) = delete;
   DualSurface& operator=(const DualSurface&) = delete;
-  /// The next layers: `solid` holds those of the range, and a block more on either side. The first range starts a block
-  /// below the solid. Cost: O(leaves), parallel; the same bits on any number of threads and in any ranges.
-  /// @throws Error TooLarge (more than 2^32 - 1 vertices), Cancelled.
-  void add(const Solid& solid, const SampleRange& range, QuadSurface& out, const Context& context);
+  /// The next layers, one by one: `solid` holds those of the range, and a block more on either side. The first range
+  /// starts a block below the solid. Cost: O(leaves), parallel; the same bits on any number of threads and in any
+  /// ranges. @throws Error TooLarge (more than 2^32 - 1 vertices), Cancelled.
+  void add(const Solid& solid, const SampleRange& range, const std::function<void(QuadLayer&&)>& use,
+           const Context& context);
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-/// All of a solid.
-[[nodiscard]] QuadSurface dual_surface(const Solid& solid, int axis, const Context& context);
+/// All that a solid's surface runs through along an axis, for DualSurface::add(); empty if there is none.
+[[nodiscard]] SampleRange surface_range(const Solid& solid, int axis);
+
+/// All of a solid, as one layer.
+[[nodiscard]] QuadLayer dual_surface(const Solid& solid, int axis, const Context& context);
 
 }  // namespace fibrolite

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <system_error>
@@ -61,6 +62,23 @@ fs::path followed(const fs::path& target) {
 
 fs::path folder_of(const fs::path& target) { return target.has_parent_path() ? target.parent_path() : fs::path("."); }
 
+/// Returns errno, or 0.
+int write_all(int fd, const std::byte* data, std::size_t size) {
+  while (size > 0) {
+    const ssize_t written = ::write(fd, data, std::min(size, std::size_t{1} << 30));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    data += written;
+    size -= static_cast<std::size_t>(written);
+  }
+  return 0;
+}
+
+[[noreturn]] void fail_to_write(int error, const fs::path& target) {
+  throw Error(Code::Io, "cannot write the output: " + system_reason(error), target.string(),
+              error == ENOSPC || error == EDQUOT ? "free some space" : "");
+}
+
 }  // namespace
 
 struct OutputFile::State {
@@ -101,19 +119,10 @@ struct OutputFile::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
-  [[noreturn]] void fail(int error) const {
-    throw Error(Code::Io, "cannot write the output: " + system_reason(error), target.string(),
-                error == ENOSPC || error == EDQUOT ? "free some space" : "");
-  }
+  [[noreturn]] void fail(int error) const { fail_to_write(error, target); }
 
   void put(const std::byte* data, std::size_t size) const {
-    while (size > 0) {
-      const ssize_t written = ::write(fd, data, std::min(size, std::size_t{1} << 30));
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail(errno);
-      data += written;
-      size -= static_cast<std::size_t>(written);
-    }
+    if (const int error = write_all(fd, data, size)) fail(error);
   }
 
   void flush() {
@@ -163,6 +172,35 @@ void OutputFile::commit() {
   if (const int folder = ::open(folder_of(state.target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); folder >= 0) {
     ::fsync(folder);
     ::close(folder);
+  }
+}
+
+ScratchFile::ScratchFile(const fs::path& folder) : folder_(folder) {
+  std::string name = (folder / ".fibrolite-XXXXXX").string();
+  fd_ = ::mkostemp(name.data(), O_CLOEXEC);
+  if (fd_ < 0) throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string());
+  ::unlink(name.c_str());
+}
+
+ScratchFile::~ScratchFile() { ::close(fd_); }
+
+std::uint64_t ScratchFile::append(std::span<const std::byte> bytes) {
+  if (const int error = write_all(fd_, bytes.data(), bytes.size())) fail_to_write(error, folder_);
+  const std::uint64_t begin = size_;
+  size_ += bytes.size();
+  return begin;
+}
+
+void ScratchFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t got = ::pread(fd_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      throw Error(Code::Io, "cannot read back what was written: " + (got < 0 ? system_reason(errno) : "it is cut off"),
+                  folder_.string());
+    }
+    offset += static_cast<std::uint64_t>(got);
+    bytes = bytes.subspan(static_cast<std::size_t>(got));
   }
 }
 

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <functional>
 
+#include "fibrolite/mesh_layers.h"
+
 namespace fibrolite {
 namespace {
 
@@ -16,13 +18,13 @@ constexpr std::size_t grain = 8192;
 // parallel_deterministic_reduce splits by the grain alone, so the sum has the
 // same order on any number of threads.
 template <class Term>
-double sum_over_triangles(const Mesh& mesh, const Term& term) {
+double sum_over(const MeshLayer& layer, const Term& term) {
   return tbb::parallel_deterministic_reduce(
-      Range(0, mesh.triangles.size(), grain), 0.0,
+      Range(0, layer.triangles.size(), grain), 0.0,
       [&](const Range& range, double sum) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-          const auto& t = mesh.triangles[i];
-          sum += term(to_double(mesh.vertices[t[0]]), to_double(mesh.vertices[t[1]]), to_double(mesh.vertices[t[2]]));
+          const auto& t = layer.triangles[i];
+          sum += term(to_double(layer.at(t[0])), to_double(layer.at(t[1])), to_double(layer.at(t[2])));
         }
         return sum;
       },
@@ -50,13 +52,16 @@ double signed_volume(const Mesh& mesh) {
   if (mesh.vertices.empty()) return 0;
   // Measured from the middle of the model: fewer digits are lost far from the
   // origin, and an open model's volume does not depend on where it stands.
-  const Vec3d middle = bounds(mesh).center();
-  return sum_over_triangles(
-      mesh, [middle](Vec3d a, Vec3d b, Vec3d c) { return dot(a - middle, cross(b - middle, c - middle)) / 6; });
+  return signed_volume({mesh.vertices, 0, 0, mesh.triangles, {}}, bounds(mesh).center());
+}
+
+double signed_volume(const MeshLayer& layer, Vec3d from) {
+  return sum_over(layer, [from](Vec3d a, Vec3d b, Vec3d c) { return dot(a - from, cross(b - from, c - from)) / 6; });
 }
 
 double area(const Mesh& mesh) {
-  return sum_over_triangles(mesh, [](Vec3d a, Vec3d b, Vec3d c) { return norm(cross(b - a, c - a)) / 2; });
+  return sum_over({mesh.vertices, 0, 0, mesh.triangles, {}},
+                  [](Vec3d a, Vec3d b, Vec3d c) { return norm(cross(b - a, c - a)) / 2; });
 }
 
 }  // namespace fibrolite

@@ -4,12 +4,17 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstddef>
+#include <memory>
 #include <numeric>
+#include <utility>
+#include <vector>
 
 #include "fibrolite/error.h"
 #include "fibrolite/mesh.h"
+#include "fibrolite/mesh_layers.h"
 #include "weld.h"
 
 namespace fibrolite {
@@ -72,89 +77,177 @@ std::uint32_t fan_root(std::vector<std::uint32_t>& fan, std::uint32_t a) {
   return a;
 }
 
+/// Looks at the vertices of a layer when the next one is there, for then all their triangles are. A vertex at the place
+/// of one in the next layer counts as that one.
 class Checker {
  public:
-  explicit Checker(const Mesh& mesh) : mesh_(mesh), weld_(weld(mesh.vertices)) {}
-
-  MeshCheck run() {
-    MeshCheck result;
-    result.triangles = static_cast<std::int64_t>(mesh_.triangles.size());
-    result.volume_mm3 = signed_volume(mesh_);
-    result.degenerate_triangles = collect_corners();
-    Sets shells(mesh_.triangles.size());
-    tbb::enumerable_thread_specific<Tally> tallies;
-    tbb::parallel_for(Range(0, weld_.count, 1024), [&](const Range& range) {
-      Tally& tally = tallies.local();
-      for (std::size_t v = range.begin(); v < range.end(); ++v) visit(static_cast<std::uint32_t>(v), tally, shells);
-    });
-    for (const Tally& tally : tallies) {  // whole numbers: any order gives the same sums
-      result.vertices += tally.vertices;
-      result.boundary_edges += tally.boundary_edges;
-      result.nonmanifold_edges += tally.nonmanifold_edges;
-      result.nonmanifold_vertices += tally.nonmanifold_vertices;
+  void add(const MeshLayer& layer) {
+    if (layer.triangles.size() > 0xffffffffu / 3)
+      throw Error(Code::TooLarge, "a mesh of over 1,431,655,765 triangles cannot be checked");
+    if (!begun_) {
+      Box3d box;
+      for (const Vec3f& v : layer.vertices) box.include(to_double(v));
+      if (!box.empty()) from_ = box.center();
+      begun_ = !box.empty();
     }
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
-      result.shells += shells.root(t) == t && !collapsed(t) ? 1 : 0;
-    return result;
+    result_.triangles += static_cast<std::int64_t>(layer.triangles.size());
+    result_.volume_mm3 += signed_volume(layer, from_);
+    const std::vector<std::uint32_t> id = name_vertices(layer);
+    for (Triangle& t : triangles_)
+      for (std::uint32_t& v : t.corners)
+        if (v >= layer.first) v = id[v - layer.first];
+    append(layer, id);
+    end_ = layer.first + layer.before;
+    if (first_ < end_) {
+      visit_all();
+      keep_open();
+    }
+    first_ = end_;
+    end_ = layer.first + layer.vertices.size();
+  }
+
+  MeshCheck finish() {
+    visit_all();
+    first_ = end_;
+    keep_open();
+    return result_;
   }
 
  private:
-  std::uint32_t vertex(std::uint32_t corner) const { return weld_.id[mesh_.triangles[corner / 3][corner % 3]]; }
-  std::uint32_t vertex(std::uint32_t triangle, std::uint32_t i) const { return weld_.id[mesh_.triangles[triangle][i]]; }
-  bool collapsed(std::uint32_t triangle) const {
-    const std::uint32_t a = vertex(triangle, 0), b = vertex(triangle, 1), c = vertex(triangle, 2);
+  /// Corners by the numbers of welded vertices.
+  struct Triangle {
+    std::array<std::uint32_t, 3> corners;
+    std::uint32_t shell;  // those with one number are connected already
+  };
+
+  /// Numbers of a layer's vertices after welding: the first of those in one place, in the newer layer if there are any.
+  static std::vector<std::uint32_t> name_vertices(const MeshLayer& layer) {
+    std::vector<std::uint32_t> id = first_equal(layer.vertices);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> newer;
+    for (std::size_t i = layer.before; i < id.size(); ++i)
+      if (id[i] < layer.before) newer.emplace_back(id[i], static_cast<std::uint32_t>(i));
+    std::sort(newer.begin(), newer.end());
+    const auto first = static_cast<std::uint32_t>(layer.first);
+    if (newer.empty()) {
+      if (first > 0)
+        tbb::parallel_for(Range(0, id.size(), 4096), [&](const Range& range) {
+          for (std::size_t i = range.begin(); i < range.end(); ++i) id[i] += first;
+        });
+      return id;
+    }
+    for (std::uint32_t& i : id) {
+      const auto at = std::lower_bound(newer.begin(), newer.end(), std::pair{i, std::uint32_t{0}});
+      i = first + (at != newer.end() && at->first == i ? at->second : i);
+    }
+    return id;
+  }
+
+  /// A layer's triangles, but those with two equal corners, which have no place in the topology.
+  void append(const MeshLayer& layer, const std::vector<std::uint32_t>& id) {
+    const std::size_t old = triangles_.size();
+    triangles_.resize(old + layer.triangles.size());
+    std::atomic<std::int64_t> degenerate{0}, collapsed{0};
+    tbb::parallel_for(Range(0, layer.triangles.size(), 4096), [&](const Range& range) {
+      std::int64_t flat = 0, none = 0;
+      for (std::size_t t = range.begin(); t < range.end(); ++t) {
+        const auto& [a, b, c] = layer.triangles[t];
+        flat += zero_area(layer.at(a), layer.at(b), layer.at(c)) ? 1 : 0;
+        Triangle& mine = triangles_[old + t];
+        mine = {{id[a - layer.first], id[b - layer.first], id[c - layer.first]}, no_shell};
+        none += is_collapsed(mine) ? 1 : 0;
+      }
+      degenerate += flat;
+      collapsed += none;
+    });
+    result_.degenerate_triangles += degenerate;
+    if (collapsed > 0) std::erase_if(triangles_, is_collapsed);
+  }
+  static bool is_collapsed(const Triangle& t) {
+    const auto& [a, b, c] = t.corners;
     return a == b || b == c || c == a;
   }
 
-  // Lists the corners at each vertex (a counting sort); triangles with two
-  // equal corners have no place in the topology. Returns the number of
-  // degenerate triangles. The order within a list depends on the threads;
+  /// All vertices from first_ to end_, whose triangles are all there.
+  void visit_all() {
+    collect_corners();
+    shells_ = std::make_unique<Sets>(triangles_.size());
+    std::vector<std::uint32_t> of_shell(shell_count_, no_shell);
+    for (std::uint32_t t = 0; t < triangles_.size() && triangles_[t].shell != no_shell; ++t) {
+      std::uint32_t& one = of_shell[triangles_[t].shell];
+      if (one == no_shell) one = t;
+      shells_->join(one, t);
+    }
+    tbb::enumerable_thread_specific<Tally> tallies;
+    tbb::parallel_for(Range(first_, end_, 1024), [&](const Range& range) {
+      Tally& tally = tallies.local();
+      for (std::size_t v = range.begin(); v < range.end(); ++v) visit(static_cast<std::uint32_t>(v), tally);
+    });
+    for (const Tally& tally : tallies) {  // whole numbers: any order gives the same sums
+      result_.vertices += tally.vertices;
+      result_.boundary_edges += tally.boundary_edges;
+      result_.nonmanifold_edges += tally.nonmanifold_edges;
+      result_.nonmanifold_vertices += tally.nonmanifold_vertices;
+    }
+  }
+
+  /// Triangles with a vertex that has not been visited stay; shells without any are whole.
+  void keep_open() {
+    const auto open = [this](const Triangle& t) {
+      return std::any_of(t.corners.begin(), t.corners.end(), [this](std::uint32_t v) { return v >= end_; });
+    };
+    std::vector<std::uint32_t> number(triangles_.size(), no_shell);
+    shell_count_ = 0;
+    std::size_t kept = 0;
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+      if (!open(triangles_[t])) continue;
+      std::uint32_t& shell = number[shells_->root(t)];
+      if (shell == no_shell) shell = shell_count_++;
+      triangles_[kept] = triangles_[t];
+      triangles_[kept++].shell = shell;
+    }
+    for (std::uint32_t t = 0; t < number.size(); ++t)
+      result_.shells += shells_->root(t) == t && number[t] == no_shell ? 1 : 0;
+    triangles_.resize(kept);
+  }
+
+  // Lists the corners at each vertex to visit (a counting sort). The order within a list depends on the threads;
   // nothing counted does.
-  std::int64_t collect_corners() {
-    const std::size_t n = mesh_.triangles.size();
-    first_.assign(std::size_t{weld_.count} + 1, 0);
-    std::atomic<std::int64_t> degenerate{0};
+  void collect_corners() {
+    starts_.assign(end_ - first_ + 1, 0);
     const auto for_corners = [&](const auto& use) {
-      tbb::parallel_for(Range(0, n, 4096), [&](const Range& range) {
+      tbb::parallel_for(Range(0, triangles_.size(), 4096), [&](const Range& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
-          const auto triangle = static_cast<std::uint32_t>(t);
-          if (!collapsed(triangle))
-            for (std::uint32_t i = 0; i < 3; ++i) use(std::atomic_ref(first_[vertex(triangle, i)]), 3 * triangle + i);
+          for (std::uint32_t i = 0; i < 3; ++i) {
+            const std::uint32_t v = triangles_[t].corners[i];
+            if (v >= first_ && v < end_)
+              use(std::atomic_ref(starts_[v - first_]), 3 * static_cast<std::uint32_t>(t) + i);
+          }
         }
       });
     };
-    tbb::parallel_for(Range(0, n, 4096), [&](const Range& range) {
-      std::int64_t count = 0;
-      for (std::size_t t = range.begin(); t < range.end(); ++t) {
-        const auto& [a, b, c] = mesh_.triangles[t];
-        count += zero_area(mesh_.vertices[a], mesh_.vertices[b], mesh_.vertices[c]) ? 1 : 0;
-      }
-      degenerate += count;
-    });
     for_corners(
-        [](std::atomic_ref<std::uint32_t> first, std::uint32_t) { first.fetch_add(1, std::memory_order_relaxed); });
+        [](std::atomic_ref<std::uint32_t> start, std::uint32_t) { start.fetch_add(1, std::memory_order_relaxed); });
     // Ends first; filling backwards turns them into beginnings.
     std::uint32_t sum = 0;
-    for (std::uint32_t& first : first_) first = sum += first;
+    for (std::uint32_t& start : starts_) start = sum += start;
     corners_.resize(sum);
-    for_corners([&](std::atomic_ref<std::uint32_t> first, std::uint32_t corner) {
-      corners_[first.fetch_sub(1, std::memory_order_relaxed) - 1] = corner;
+    for_corners([&](std::atomic_ref<std::uint32_t> start, std::uint32_t corner) {
+      corners_[start.fetch_sub(1, std::memory_order_relaxed) - 1] = corner;
     });
-    return degenerate;
   }
 
   // Judges one vertex and the edges to vertices with greater numbers, and joins
   // the triangles along those.
-  void visit(std::uint32_t v, Tally& tally, Sets& shells) const {
-    const std::uint32_t begin = first_[v], count = first_[v + 1] - begin;
+  void visit(std::uint32_t v, Tally& tally) const {
+    const std::uint32_t begin = starts_[v - first_], count = starts_[v - first_ + 1] - begin;
     if (count == 0) return;
     ++tally.vertices;
     tally.arcs.clear();
     tally.fan.resize(count);
     for (std::uint32_t c = 0; c < count; ++c) {
       const std::uint32_t triangle = corners_[begin + c] / 3, i = corners_[begin + c] % 3;
-      tally.arcs.push_back({vertex(triangle, (i + 1) % 3), c, true});
-      tally.arcs.push_back({vertex(triangle, (i + 2) % 3), c, false});
+      tally.arcs.push_back({triangles_[triangle].corners[(i + 1) % 3], c, true});
+      tally.arcs.push_back({triangles_[triangle].corners[(i + 2) % 3], c, false});
       tally.fan[c] = c;
     }
     std::sort(tally.arcs.begin(), tally.arcs.end(), [](const Arc& a, const Arc& b) { return a.other < b.other; });
@@ -170,7 +263,7 @@ class Checker {
           --fans;
         }
         if (j > i && v < tally.arcs[i].other)
-          shells.join(corners_[begin + tally.arcs[i].corner] / 3, corners_[begin + tally.arcs[j].corner] / 3);
+          shells_->join(corners_[begin + tally.arcs[i].corner] / 3, corners_[begin + tally.arcs[j].corner] / 3);
       }
       if (v > tally.arcs[i].other) continue;
       const auto triangles = static_cast<std::int64_t>(j - i);
@@ -180,17 +273,25 @@ class Checker {
     tally.nonmanifold_vertices += fans > 1 ? 1 : 0;
   }
 
-  const Mesh& mesh_;
-  Weld weld_;
-  std::vector<std::uint32_t> first_, corners_;
+  static constexpr std::uint32_t no_shell = 0xffffffff;
+  MeshCheck result_;
+  Vec3d from_{};
+  bool begun_ = false;
+  std::vector<Triangle> triangles_;
+  std::unique_ptr<Sets> shells_;
+  std::uint32_t shell_count_ = 0;
+  std::size_t first_ = 0, end_ = 0;  // vertices to visit
+  std::vector<std::uint32_t> starts_, corners_;
 };
 
 }  // namespace
 
-MeshCheck check(const Mesh& mesh) {
-  if (mesh.triangles.size() > 0xffffffffu / 3)
-    throw Error(Code::TooLarge, "a mesh of over 1,431,655,765 triangles cannot be checked");
-  return Checker(mesh).run();
+MeshCheck check(const MeshLayers& layers, const Context& context) {
+  Checker checker;
+  layers.each([&](const MeshLayer& layer) { checker.add(layer); }, context);
+  return checker.finish();
 }
+
+MeshCheck check(const Mesh& mesh) { return check(WholeMesh(mesh)); }
 
 }  // namespace fibrolite

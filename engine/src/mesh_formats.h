@@ -9,6 +9,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "fibrolite/context.h"
 #include "fibrolite/file.h"
 #include "fibrolite/mesh_io.h"
+#include "fibrolite/mesh_layers.h"
 #include "text_cursor.h"
 
 namespace fibrolite {
@@ -27,11 +29,11 @@ MeshFile read_ply(const Source& source, const Context& context);
 MeshFile read_off(const Source& source, const Context& context);
 MeshFile read_3mf(const Source& source, const Context& context);
 
-void write_stl(OutputFile& file, const Mesh& mesh, const Context& context);
-void write_obj(OutputFile& file, const Mesh& mesh, const Context& context);
-void write_ply(OutputFile& file, const Mesh& mesh, const Context& context);
-void write_off(OutputFile& file, const Mesh& mesh, const Context& context);
-void write_3mf(OutputFile& file, const Mesh& mesh, const Context& context);
+void write_stl(OutputFile& file, const MeshLayers& mesh, const Context& context);
+void write_obj(OutputFile& file, const MeshLayers& mesh, const Context& context);
+void write_ply(OutputFile& file, const MeshLayers& mesh, const Context& context);
+void write_off(OutputFile& file, const MeshLayers& mesh, const Context& context);
+void write_3mf(OutputFile& file, const MeshLayers& mesh, const Context& context);
 
 /// Splits polygons into triangles: a fan from the first corner, or by cutting ears where that would leave the polygon.
 class PolygonSink {
@@ -55,10 +57,9 @@ constexpr std::size_t items_per_chunk = std::size_t{1} << 14;
 constexpr std::size_t chunks_at_once = 32;
 
 /// Call `append(text, i)` for the items [0, count) in parallel, a chunk of items per string, and `use(text)` for the
-/// chunks in their order. Memory: a few tens of MB, whatever the count. Progress goes from `from` to `to`.
+/// chunks in their order. Memory: a few tens of MB, whatever the count.
 template <class Append, class Use>
-void for_chunks_in_order(std::size_t count, const Context& context, double from, double to, const Append& append,
-                         const Use& use) {
+void for_chunks_in_order(std::size_t count, const Context& context, const Append& append, const Use& use) {
   using Chunk = decltype(use.prepare(std::string{}));
   const std::size_t chunks = (count + items_per_chunk - 1) / items_per_chunk;
   std::vector<Chunk> ready(std::min(chunks, chunks_at_once));
@@ -72,7 +73,6 @@ void for_chunks_in_order(std::size_t count, const Context& context, double from,
       ready[k] = use.prepare(std::move(text));
     });
     for (std::size_t k = 0; k < n; ++k) use.take(std::move(ready[k]));
-    context.progress(from + (to - from) * static_cast<double>(begin + n) / static_cast<double>(chunks));
   }
 }
 
@@ -82,6 +82,27 @@ struct WriteChunks {
   static std::string prepare(std::string&& text) { return std::move(text); }
   void take(std::string&& text) const { file.write(text); }
 };
+
+/// A mesh's vertices, and its triangles, as text or bytes: each layer in chunks.
+template <class Append, class Use>
+void for_vertices(const MeshLayers& mesh, const Context& context, const Append& append, const Use& use) {
+  mesh.each(
+      [&](const MeshLayer& layer) {
+        const std::span<const Vec3f> fresh = layer.fresh();
+        const auto one = [&](std::string& text, std::size_t i) { append(text, fresh[i]); };
+        for_chunks_in_order(fresh.size(), context, one, use);
+      },
+      context);
+}
+template <class Append, class Use>
+void for_triangles(const MeshLayers& mesh, const Context& context, const Append& append, const Use& use) {
+  mesh.each(
+      [&](const MeshLayer& layer) {
+        const auto one = [&](std::string& text, std::size_t t) { append(text, layer, t); };
+        for_chunks_in_order(layer.triangles.size(), context, one, use);
+      },
+      context);
+}
 
 static_assert(std::endian::native == std::endian::little, "the binary formats are written as the machine holds them");
 

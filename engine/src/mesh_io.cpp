@@ -15,7 +15,7 @@ namespace {
 struct Format {
   const char* ending;
   MeshFile (*read)(const Source&, const Context&);
-  void (*write)(OutputFile&, const Mesh&, const Context&);
+  void (*write)(OutputFile&, const MeshLayers&, const Context&);
 };
 constexpr std::array formats{Format{".stl", read_stl, write_stl}, Format{".obj", read_obj, write_obj},
                              Format{".ply", read_ply, write_ply}, Format{".off", read_off, write_off},
@@ -63,8 +63,12 @@ MeshFile read_mesh(const std::filesystem::path& path, const Context& context) {
 }
 
 void write_mesh(const std::filesystem::path& path, const Mesh& mesh, const Context& context) {
+  write_mesh(path, WholeMesh(mesh), context);
+}
+
+void write_mesh(const std::filesystem::path& path, const MeshLayers& mesh, const Context& context) {
   const Format& format = format_of(path);
-  if (mesh.triangles.empty())
+  if (mesh.triangles() == 0)
     throw Error(Code::BadInput, "there is nothing to write: the mesh has no triangles", path.string());
   OutputFile file(path);
   format.write(file, mesh, context);

@@ -71,31 +71,26 @@ class ObjReader {
 
 MeshFile read_obj(const Source& source, const Context& context) { return ObjReader(source, context).read(); }
 
-void write_obj(OutputFile& file, const Mesh& mesh, const Context& context) {
+void write_obj(OutputFile& file, const MeshLayers& mesh, const Context& context) {
   file.write("# Millimetres, by Fibrolite\n");
-  for_chunks_in_order(
-      mesh.vertices.size(), context, 0, 0.4,
-      [&](std::string& text, std::size_t i) {
-        const Vec3f p = mesh.vertices[i];
-        text += 'v';
-        for (const float x : {p.x, p.y, p.z}) {
-          text += ' ';
-          append_number(text, x);
-        }
-        text += '\n';
-      },
-      WriteChunks{file});
-  for_chunks_in_order(
-      mesh.triangles.size(), context, 0.4, 1,
-      [&](std::string& text, std::size_t t) {
-        text += 'f';
-        for (const std::uint32_t i : mesh.triangles[t]) {
-          text += ' ';
-          append_number(text, std::uint64_t{i} + 1);
-        }
-        text += '\n';
-      },
-      WriteChunks{file});
+  const auto vertex = [](std::string& text, Vec3f p) {
+    text += 'v';
+    for (const float x : {p.x, p.y, p.z}) {
+      text += ' ';
+      append_number(text, x);
+    }
+    text += '\n';
+  };
+  for_vertices(mesh, context.part(0, 0.4, ""), vertex, WriteChunks{file});
+  const auto face = [](std::string& text, const MeshLayer& layer, std::size_t t) {
+    text += 'f';
+    for (const std::uint32_t i : layer.triangles[t]) {
+      text += ' ';
+      append_number(text, std::uint64_t{i} + 1);
+    }
+    text += '\n';
+  };
+  for_triangles(mesh, context.part(0.4, 1, ""), face, WriteChunks{file});
 }
 
 }  // namespace fibrolite

@@ -80,31 +80,26 @@ MeshFile read_off(const Source& source, const Context& context) {
   return file;
 }
 
-void write_off(OutputFile& file, const Mesh& mesh, const Context& context) {
-  file.write("OFF\n" + std::to_string(mesh.vertices.size()) + ' ' + std::to_string(mesh.triangles.size()) + " 0\n");
-  for_chunks_in_order(
-      mesh.vertices.size(), context, 0, 0.4,
-      [&](std::string& text, std::size_t i) {
-        const Vec3f p = mesh.vertices[i];
-        append_number(text, p.x);
-        text += ' ';
-        append_number(text, p.y);
-        text += ' ';
-        append_number(text, p.z);
-        text += '\n';
-      },
-      WriteChunks{file});
-  for_chunks_in_order(
-      mesh.triangles.size(), context, 0.4, 1,
-      [&](std::string& text, std::size_t t) {
-        text += '3';
-        for (const std::uint32_t i : mesh.triangles[t]) {
-          text += ' ';
-          append_number(text, std::uint64_t{i});
-        }
-        text += '\n';
-      },
-      WriteChunks{file});
+void write_off(OutputFile& file, const MeshLayers& mesh, const Context& context) {
+  file.write("OFF\n" + std::to_string(mesh.vertices()) + ' ' + std::to_string(mesh.triangles()) + " 0\n");
+  const auto vertex = [](std::string& text, Vec3f p) {
+    append_number(text, p.x);
+    text += ' ';
+    append_number(text, p.y);
+    text += ' ';
+    append_number(text, p.z);
+    text += '\n';
+  };
+  for_vertices(mesh, context.part(0, 0.4, ""), vertex, WriteChunks{file});
+  const auto face = [](std::string& text, const MeshLayer& layer, std::size_t t) {
+    text += '3';
+    for (const std::uint32_t i : layer.triangles[t]) {
+      text += ' ';
+      append_number(text, std::uint64_t{i});
+    }
+    text += '\n';
+  };
+  for_triangles(mesh, context.part(0.4, 1, ""), face, WriteChunks{file});
 }
 
 }  // namespace fibrolite

@@ -372,25 +372,21 @@ MeshFile read_ply(const Source& source, const Context& context) {
   return PlyBody(header, BinaryValues(source, header.end, header.encoding == Encoding::Big), context).read();
 }
 
-void write_ply(OutputFile& file, const Mesh& mesh, const Context& context) {
-  const bool colored = !mesh.triangle_colors.empty();
+void write_ply(OutputFile& file, const MeshLayers& mesh, const Context& context) {
+  const bool colored = mesh.colored();
   std::string header = "ply\nformat binary_little_endian 1.0\ncomment Millimetres, by Fibrolite\nelement vertex ";
-  header +=
-      std::to_string(mesh.vertices.size()) + "\nproperty float x\nproperty float y\nproperty float z\nelement face ";
-  header += std::to_string(mesh.triangles.size()) + "\nproperty list uchar uint vertex_indices\n";
+  header += std::to_string(mesh.vertices()) + "\nproperty float x\nproperty float y\nproperty float z\nelement face ";
+  header += std::to_string(mesh.triangles()) + "\nproperty list uchar uint vertex_indices\n";
   if (colored) header += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   file.write(header + "end_header\n");
-  for_chunks_in_order(
-      mesh.vertices.size(), context, 0, 0.4,
-      [&](std::string& text, std::size_t i) { append_bytes(text, mesh.vertices[i]); }, WriteChunks{file});
-  for_chunks_in_order(
-      mesh.triangles.size(), context, 0.4, 1,
-      [&](std::string& text, std::size_t t) {
-        text += '\3';
-        append_bytes(text, mesh.triangles[t]);
-        if (colored) append_bytes(text, mesh.triangle_colors[t]);
-      },
-      WriteChunks{file});
+  const auto vertex = [](std::string& text, Vec3f p) { append_bytes(text, p); };
+  for_vertices(mesh, context.part(0, 0.4, ""), vertex, WriteChunks{file});
+  const auto face = [colored](std::string& text, const MeshLayer& layer, std::size_t t) {
+    text += '\3';
+    append_bytes(text, layer.triangles[t]);
+    if (colored) append_bytes(text, layer.colors[t]);
+  };
+  for_triangles(mesh, context.part(0.4, 1, ""), face, WriteChunks{file});
 }
 
 }  // namespace fibrolite

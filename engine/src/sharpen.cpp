@@ -35,7 +35,7 @@ FacedSurface zero_level(const openvdb::FloatTree::Ptr& level_set, double voxel_m
   const Grid spec{.voxel_mm = voxel_mm};
   auto grid = make_grid(spec);
   grid->setTree(level_set);
-  const QuadSurface zero = dual_surface(make_solid(std::move(grid), spec), 2, {});
+  const QuadLayer zero = dual_surface(make_solid(std::move(grid), spec), 2, {});
   FacedSurface surface;
   surface.points.reserve(zero.points.size());
   for (const auto& p : zero.points) surface.points.push_back({p.x(), p.y(), p.z()});

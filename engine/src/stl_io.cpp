@@ -149,27 +149,24 @@ MeshFile read_stl(const Source& source, const Context& context) {
   return read_binary(source, count, context);
 }
 
-void write_stl(OutputFile& file, const Mesh& mesh, const Context& context) {
-  if (mesh.triangles.size() > 0xffffffffu)
-    throw Error(Code::TooLarge, "an STL file holds at most 4,294,967,295 triangles");
+void write_stl(OutputFile& file, const MeshLayers& mesh, const Context& context) {
+  if (mesh.triangles() > 0xffffffffu) throw Error(Code::TooLarge, "an STL file holds at most 4,294,967,295 triangles");
   std::string header = "Binary STL, millimetres, by Fibrolite";  // must not begin with 'solid'
   header.resize(header_bytes, ' ');
-  append_bytes(header, static_cast<std::uint32_t>(mesh.triangles.size()));
+  append_bytes(header, static_cast<std::uint32_t>(mesh.triangles()));
   file.write(header);
   struct Record {
     std::array<Vec3f, 4> normal_and_corners;
   };
-  for_chunks_in_order(
-      mesh.triangles.size(), context, 0, 1,
-      [&](std::string& text, std::size_t t) {
-        const auto& [ia, ib, ic] = mesh.triangles[t];
-        const Vec3f a = mesh.vertices[ia], b = mesh.vertices[ib], c = mesh.vertices[ic];
-        const Vec3d normal = normalized(cross(to_double(b) - to_double(a), to_double(c) - to_double(a)));
-        if (text.empty()) text.reserve(items_per_chunk * triangle_bytes);
-        append_bytes(text, Record{{to_float(normal), a, b, c}});
-        text.append(2, '\0');
-      },
-      WriteChunks{file});
+  const auto append = [](std::string& text, const MeshLayer& layer, std::size_t t) {
+    const auto& [ia, ib, ic] = layer.triangles[t];
+    const Vec3f a = layer.at(ia), b = layer.at(ib), c = layer.at(ic);
+    const Vec3d normal = normalized(cross(to_double(b) - to_double(a), to_double(c) - to_double(a)));
+    if (text.empty()) text.reserve(items_per_chunk * triangle_bytes);
+    append_bytes(text, Record{{to_float(normal), a, b, c}});
+    text.append(2, '\0');
+  };
+  for_triangles(mesh, context, append, WriteChunks{file});
 }
 
 }  // namespace fibrolite

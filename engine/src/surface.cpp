@@ -7,11 +7,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <cstddef>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "dual_surface.h"
+#include "fibrolite/error.h"
+#include "fibrolite/file.h"
 #include "fibrolite/random.h"
+#include "keep_volume.h"
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -27,201 +32,223 @@ void return_free_memory() {
 #endif
 }
 
-using Points = std::vector<openvdb::Vec3s>;
-using Quad = std::array<std::uint32_t, 4>;
-using Quads = std::vector<Quad>;
-
-Vec3d at(const Points& points, std::uint32_t i) { return {points[i].x(), points[i].y(), points[i].z()}; }
+template <class Work>
+void each_chunk(std::size_t count, const Work& work) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
+  });
+}
 
 /// Without area.
-bool flat(const Points& points, std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-  const Vec3d n = cross(at(points, b) - at(points, a), at(points, c) - at(points, a));
+bool flat(Vec3f a, Vec3f b, Vec3f c) {
+  const Vec3d n = cross(to_double(b) - to_double(a), to_double(c) - to_double(a));
   return dot(n, n) <= 0;
 }
 
-double squared_distance(const Points& points, std::uint32_t a, std::uint32_t b) {
-  const Vec3d d = at(points, b) - at(points, a);
-  return dot(d, d);
-}
-
-/// Split each quad along its shorter diagonal, unless that leaves a triangle without area.
-Mesh::Triangle* split(const Points& points, const Quad& q, Mesh::Triangle* out) {
-  bool first = squared_distance(points, q[0], q[2]) <= squared_distance(points, q[1], q[3]);
-  const auto without_area = [&](std::size_t a, std::size_t b, std::size_t c) { return flat(points, q[a], q[b], q[c]); };
-  if (first ? without_area(0, 1, 2) || without_area(0, 2, 3) : without_area(0, 1, 3) || without_area(1, 2, 3))
-    first = !first;
-  if (first) {
-    *out++ = {q[0], q[1], q[2]};
-    *out++ = {q[0], q[2], q[3]};
-  } else {
-    *out++ = {q[0], q[1], q[3]};
-    *out++ = {q[1], q[2], q[3]};
+/// What has been made of the layers, in memory or in a scratch file.
+class LayerStore {
+ public:
+  explicit LayerStore(const std::optional<std::filesystem::path>& scratch) {
+    if (scratch) file_ = std::make_unique<ScratchFile>(*scratch);
   }
-  return out;
-}
 
-/// Volume that the quads enclose, each split along its shorter diagonal. Chunks are added in order: the same bits on
-/// any number of threads.
-double volume(const Points& points, const Quads& quads) {
-  constexpr std::size_t chunk = 65536;
-  std::vector<double> sums((quads.size() + chunk - 1) / chunk, 0.0);
-  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t c) {
-    for (std::size_t i = c * chunk; i < std::min(quads.size(), (c + 1) * chunk); ++i) {
-      const Vec3d a = at(points, quads[i][0]), b = at(points, quads[i][1]), p = at(points, quads[i][2]),
-                  q = at(points, quads[i][3]);
-      const Vec3d ap = p - a, bq = q - b;
-      sums[c] += dot(ap, ap) <= dot(bq, bq) ? dot(a, cross(p, bq)) : dot(q, cross(b, ap));
+  void push(MovableLayer&& layer) {
+    points_ += layer.points.size();
+    quads_ += layer.quads.size();
+    if (file_ == nullptr) {
+      in_memory_.push_back(std::move(layer));
+      return;
     }
-  });
-  double sum = 0;
-  for (const double s : sums) sum += s;
-  return sum / 6;
-}
-
-/// Calls work(quad) for all quads, in parallel, no two at once that share a vertex, and those of one vertex in the same
-/// order on any number of threads: every other layer, since quads of a layer have their vertices in it and the one
-/// below.
-template <class Work>
-void each_quad(const QuadSurface& surface, const Work& work) {
-  const std::size_t layers = surface.layer_quads.size() - 1;
-  for (const std::size_t parity : {0U, 1U}) {
-    tbb::parallel_for(std::size_t{0}, (layers + 1 - parity) / 2, [&](std::size_t n) {
-      const std::size_t layer = 2 * n + parity;
-      for (std::size_t i = surface.layer_quads[layer]; i < surface.layer_quads[layer + 1]; ++i) work(surface.quads[i]);
-    });
+    Place place{layer.first, layer.points.size(), layer.moves.size(), layer.quads.size(), 0};
+    place.offset = file_->append(std::as_bytes(std::span(layer.points)));
+    file_->append(std::as_bytes(std::span(layer.moves)));
+    file_->append(std::as_bytes(std::span(layer.quads)));
+    in_file_.push_back(place);
   }
-}
 
-/// A mesh with its vertices on (or, as here, averaged below) a convex surface lies inside it and loses volume. To
-/// second order the loss is made good by moving each vertex along its normal by the normal part of its umbrella vector,
-/// mirrored; how far exactly is then set by the volume of the grid. Flat faces and sharp edges stay where they are: an
-/// edge is a bend beside something flat; a stick as thin as two voxels bends as much but has nothing flat around it.
-void inflate(QuadSurface& surface, double voxel, double wanted_mm3) {
-  Points& points = surface.points;
-  const Quads& quads = surface.quads;
-  constexpr float sharp = 0.72F, smooth = 0.86F;  // flatness of a vertex: 1 on a face, cos 45 degrees on a box's edge
-  constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
-  const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
-  struct Umbrella {
-    float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours; later the move
-    float nx = 0, ny = 0, nz = 0;  // sum of quad normals
-    float flatness = 0;  // their lengths, summed: longer than the sum where the surface bends; later the ratio
-    float edges = 0;     // neighbours, counted once per quad; later the flattest vertex around
-  };
-  std::vector<Umbrella> umbrellas(points.size());
-  each_quad(surface, [&](const Quad& q) {
-    const openvdb::Vec3s n = (points[q[2]] - points[q[0]]).cross(points[q[3]] - points[q[1]]);
-    const float length = n.length();
-    for (std::size_t k = 0; k < 4; ++k) {
-      Umbrella& u = umbrellas[q[k]];
-      const openvdb::Vec3s d = points[q[(k + 1) & 3]] + points[q[(k + 3) & 3]] - 2.0F * points[q[k]];
-      u.x += d.x();
-      u.y += d.y();
-      u.z += d.z();
-      u.nx += n.x();
-      u.ny += n.y();
-      u.nz += n.z();
-      u.flatness += length;
-      u.edges += 2;
-    }
-  });
-  const auto each_point = [&](const auto& work) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points.size(), 4096), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
-    });
-  };
-  each_point([&](std::size_t i) {
-    Umbrella& u = umbrellas[i];
-    const float n = std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz), mean = 1 / std::max(u.edges, 1.0F);
-    u.x *= mean, u.y *= mean, u.z *= mean;
-    u.flatness = u.flatness > 0 ? n / u.flatness : 0;
-    u.edges = 0;
-  });
-  each_quad(surface, [&](const Quad& q) {
-    float most = 0;
-    for (const std::uint32_t v : q) most = std::max(most, umbrellas[v].flatness);
-    for (const std::uint32_t v : q) umbrellas[v].edges = std::max(umbrellas[v].edges, most);
-  });
-  const double most = 0.35 * voxel;
-  each_point([&](std::size_t i) {
-    Umbrella& u = umbrellas[i];
-    const Vec3d n = normalized(Vec3d{u.nx, u.ny, u.nz});
-    const double along = dot(Vec3d{u.x, u.y, u.z}, n);
-    const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.edges, bent, flat);
-    const Vec3f move = to_float(std::clamp((edge - 1) * along, -most, most) * n);
-    u.x = move.x, u.y = move.y, u.z = move.z;
-  });
-  // Two steps or so: a quad's shorter diagonal may turn on the way. A field that is no distance may hold a volume that
-  // no such move can reach.
-  constexpr int rounds = 4;
-  constexpr double close_enough = 1e-3;
-  double now = volume(points, quads), moved = 0, step = 1;
-  for (int round = 0; round < rounds && step != 0; ++round) {
-    const double to = std::clamp(moved + step, 0.0, 2.0);
-    const auto more = static_cast<float>(to - moved);
-    each_point(
-        [&](std::size_t i) { points[i] += more * openvdb::Vec3s(umbrellas[i].x, umbrellas[i].y, umbrellas[i].z); });
-    const double after = volume(points, quads), gained = after - now;
-    const bool done = gained == 0 || std::abs(after - wanted_mm3) <= close_enough * wanted_mm3;
-    step = done ? 0 : (wanted_mm3 - after) * (to - moved) / gained;
-    moved = to;
-    now = after;
+  [[nodiscard]] std::size_t size() const { return in_memory_.size() + in_file_.size(); }
+  [[nodiscard]] std::size_t points() const { return points_; }
+  [[nodiscard]] std::size_t quads() const { return quads_; }
+
+  /// `room` holds it, if it must be read first.
+  [[nodiscard]] const MovableLayer& layer(std::size_t n, MovableLayer& room) const {
+    if (file_ == nullptr) return in_memory_[n];
+    const Place& place = in_file_[n];
+    room.first = place.first;
+    room.points.resize(place.points);
+    room.moves.resize(place.moves);
+    room.quads.resize(place.quads);
+    std::uint64_t offset = place.offset;
+    const auto read = [&](auto& list) {
+      const std::span<std::byte> bytes = std::as_writable_bytes(std::span(list));
+      file_->read(offset, bytes);
+      offset += bytes.size();
+    };
+    read(room.points);
+    read(room.moves);
+    read(room.quads);
+    return room;
   }
-}
 
-bool degenerate(const Points& points, const Quad& q) {
-  return (flat(points, q[0], q[1], q[2]) || flat(points, q[0], q[2], q[3])) &&
-         (flat(points, q[0], q[1], q[3]) || flat(points, q[1], q[2], q[3]));
-}
+ private:
+  struct Place {
+    std::size_t first, points, moves, quads;
+    std::uint64_t offset;
+  };
+  std::vector<MovableLayer> in_memory_;
+  std::vector<Place> in_file_;
+  std::unique_ptr<ScratchFile> file_;
+  std::size_t points_ = 0, quads_ = 0;
+};
 
-bool any_degenerate(const Points& points, const Quads& quads) {
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, quads.size(), 65536), false,
-      [&](const auto& range, bool found) {
-        for (std::size_t i = range.begin(); i < range.end() && !found; ++i) found = degenerate(points, quads[i]);
-        return found;
-      },
-      [](bool a, bool b) { return a || b; });
-}
+/// The layers' last step, one after another: moved, split. A layer is done when the next one has been looked at, which
+/// may shake its vertices.
+class Finisher {
+ public:
+  using Use = std::function<void(const MeshLayer&)>;
+  Finisher(float step, double voxel_mm, const Use& use) : step_(step), voxel_mm_(voxel_mm), use_(use) {}
 
-/// Quads that neither diagonal saves: move a corner by a thousandth of a voxel in a random direction and look again.
-void shake_degenerate(Points& points, const Quads& quads, double voxel) {
-  Random random(1, "surface");
-  for (int round = 0; round < 8 && any_degenerate(points, quads); ++round) {
-    for (const auto& q : quads) {
-      if (!degenerate(points, q)) continue;
-      for (std::size_t k = 0; k < 4; ++k) {
-        const auto step = [&] { return static_cast<float>((random.uniform() - 0.5) * 4e-3 * voxel); };
-        const float dx = step(), dy = step(), dz = step();
-        points[q[k]] += openvdb::Vec3s(dx, dy, dz);
+  void add(const MovableLayer& layer) {
+    const std::size_t from = points_.size();
+    if (from == 0) first_ = layer.first;
+    points_.resize(from + layer.points.size());
+    each_chunk(layer.points.size(), [&](std::size_t i) {
+      openvdb::Vec3s p = layer.points[i];
+      if (!layer.moves.empty()) p += step_ * layer.moves[i];
+      points_[from + i] = {p.x(), p.y(), p.z()};
+    });
+    shake_degenerate(layer.quads);
+    hand_on();
+    before_ = upper_;
+    upper_ = layer.points.size();
+    quads_ = layer.quads;
+    ++number_;
+  }
+  void finish() { hand_on(); }
+
+ private:
+  [[nodiscard]] Vec3f at(std::uint32_t v) const { return points_[v - first_]; }
+  [[nodiscard]] bool flat(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+    return fibrolite::flat(at(a), at(b), at(c));
+  }
+  [[nodiscard]] bool degenerate(const Quad& q) const {
+    return (flat(q[0], q[1], q[2]) || flat(q[0], q[2], q[3])) && (flat(q[0], q[1], q[3]) || flat(q[1], q[2], q[3]));
+  }
+  [[nodiscard]] bool any_degenerate(const std::vector<Quad>& quads) const {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, quads.size(), 4096), false,
+        [&](const auto& range, bool found) {
+          for (std::size_t i = range.begin(); i < range.end() && !found; ++i) found = degenerate(quads[i]);
+          return found;
+        },
+        [](bool a, bool b) { return a || b; });
+  }
+
+  /// Quads that neither diagonal saves: move a corner by a thousandth of a voxel in a random direction and look again.
+  void shake_degenerate(const std::vector<Quad>& quads) {
+    Random random(1, "surface", number_);
+    for (int round = 0; round < 8 && any_degenerate(quads); ++round) {
+      for (const auto& q : quads) {
+        if (!degenerate(q)) continue;
+        for (const std::uint32_t v : q) {
+          const auto step = [&] { return static_cast<float>((random.uniform() - 0.5) * 4e-3 * voxel_mm_); };
+          Vec3f& p = points_[v - first_];
+          p = {p.x + step(), p.y + step(), p.z + step()};
+        }
       }
     }
   }
-}
+
+  /// Each quad along its diagonal, unless that leaves a triangle without area.
+  void hand_on() {
+    if (before_ + upper_ == 0) return;
+    triangles_.resize(2 * quads_.size());
+    each_chunk(quads_.size(), [&](std::size_t i) {
+      const Quad& q = quads_[i];
+      const bool other = flat(q[0], q[1], q[2]) || flat(q[0], q[2], q[3]);
+      triangles_[2 * i] = {q[0], q[1], other ? q[3] : q[2]};
+      triangles_[2 * i + 1] = {other ? q[1] : q[0], q[2], q[3]};
+    });
+    use_({std::span(points_).first(before_ + upper_), first_, before_, triangles_, {}});
+    points_.erase(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_));
+    first_ += before_;
+  }
+
+  float step_;
+  double voxel_mm_;
+  const Use& use_;
+  // Of the layer below the one that waits, that one, and for a moment the next.
+  std::vector<Vec3f> points_;
+  std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
+  std::vector<Quad> quads_;  // of the one that waits
+  std::vector<Mesh::Triangle> triangles_;
+};
 
 }  // namespace
 
-Mesh surface(const Solid& solid, const SurfaceParams& params, const Context& context) {
+struct SurfaceLayers::Impl {
+  Impl(Grid g, const SurfaceParams& p, const std::optional<std::filesystem::path>& scratch)
+      : grid(g), params(p), dual(g, p.axis), keep(g.voxel_mm, p.keep_volume), store(scratch) {}
+
+  void push(MovableLayer&& layer) { store.push(std::move(layer)); }
+
+  Grid grid;
+  SurfaceParams params;
+  DualSurface dual;
+  KeepVolume keep;
+  LayerStore store;
+  double step = 0;
+  bool finished = false;
+};
+
+SurfaceLayers::SurfaceLayers(Grid grid, const SurfaceParams& params,
+                             const std::optional<std::filesystem::path>& scratch)
+    : impl_(std::make_unique<Impl>(grid, params, scratch)) {}
+SurfaceLayers::~SurfaceLayers() = default;
+
+void SurfaceLayers::add(const Solid& solid, const Context& context) {
+  add(solid, surface_range(solid, impl_->params.axis), context);
+}
+
+void SurfaceLayers::add(const Solid& solid, const SampleRange& range, const Context& context) {
+  if (range.axis != impl_->params.axis) throw Error(Code::Internal, "slabs lie across another axis than the layers");
   context.check();
   return_free_memory();
-  QuadSurface zero = dual_surface(solid, params.axis, context.part(0, 0.5, ""));
-  context.check();
-  const double voxel = solid.grid().voxel_mm;
-  if (params.keep_volume) inflate(zero, voxel, solid.volume_mm3());
-  shake_degenerate(zero.points, zero.quads, voxel);
-  context.check();
+  impl_->dual.add(
+      solid, range,
+      [&](QuadLayer&& layer) {
+        impl_->keep.add(std::move(layer), [&](MovableLayer&& done) { impl_->push(std::move(done)); });
+      },
+      context);
+}
 
-  Mesh mesh;
-  mesh.triangles.resize(2 * zero.quads.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, zero.quads.size(), 4096), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) split(zero.points, zero.quads[i], &mesh.triangles[2 * i]);
-  });
-  Quads().swap(zero.quads);
-  mesh.vertices.resize(zero.points.size());
-  for (std::size_t i = 0; i < zero.points.size(); ++i)
-    mesh.vertices[i] = {zero.points[i].x(), zero.points[i].y(), zero.points[i].z()};
-  context.progress(1);
-  return mesh;
+void SurfaceLayers::finish(double volume_mm3) {
+  impl_->keep.finish([&](MovableLayer&& done) { impl_->push(std::move(done)); });
+  impl_->step = impl_->params.keep_volume ? impl_->keep.step(volume_mm3) : 0;
+  impl_->finished = true;
+}
+
+std::size_t SurfaceLayers::vertices() const { return impl_->store.points(); }
+std::size_t SurfaceLayers::triangles() const { return 2 * impl_->store.quads(); }
+
+void SurfaceLayers::each(const std::function<void(const MeshLayer&)>& use, const Context& context) const {
+  if (!impl_->finished) throw Error(Code::Internal, "the surface is not finished");
+  Finisher finisher(static_cast<float>(impl_->step), impl_->grid.voxel_mm, use);
+  MovableLayer room;
+  const std::size_t count = impl_->store.size();
+  for (std::size_t n = 0; n < count; ++n) {
+    context.check();
+    finisher.add(impl_->store.layer(n, room));
+    context.progress(static_cast<double>(n + 1) / static_cast<double>(count));
+  }
+  finisher.finish();
+}
+
+Mesh surface(const Solid& solid, const SurfaceParams& params, const Context& context) {
+  SurfaceLayers layers(solid.grid(), params);
+  layers.add(solid, context.part(0, 0.8, ""));
+  layers.finish(params.keep_volume ? solid.volume_mm3() : 0);
+  return gathered(layers, context.part(0.8, 1, ""));
 }
 
 }  // namespace fibrolite

@@ -2,6 +2,7 @@
 #include <Model/COM/NMR_DLLInterfaces.h>
 
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "fibrolite/error.h"
@@ -195,11 +196,11 @@ class ThreeMfReader {
   std::int64_t objects_ = 0, supports_ = 0;
 };
 
-// Chunks of the model's text become deflated pieces.
+// Chunks of the model's text become deflated pieces of the open entry.
 struct DeflateChunks {
-  std::vector<DeflatedPiece>& pieces;
+  ZipWriter& zip;
   static DeflatedPiece prepare(std::string&& text) { return deflate_piece(text); }
-  void take(DeflatedPiece&& piece) const { pieces.push_back(std::move(piece)); }
+  void take(DeflatedPiece&& piece) const { zip.append(piece); }
 };
 
 std::string hex(Rgb color) {
@@ -212,23 +213,28 @@ std::string hex(Rgb color) {
   return text;
 }
 
-// The distinct colours, in order of appearance, and the number of each triangle's.
-struct Palette {
-  std::vector<Rgb> colors;
-  std::vector<std::uint32_t> index;
-
-  explicit Palette(const std::vector<Rgb>& of_triangles) : index(of_triangles.size()) {
-    std::vector<std::uint32_t> number(std::size_t{1} << 24, 0);  // by colour, from 1
-    for (std::size_t t = 0; t < of_triangles.size(); ++t) {
-      const Rgb c = of_triangles[t];
-      std::uint32_t& n = number[(std::size_t{c.r} << 16) | (std::size_t{c.g} << 8) | c.b];
-      if (n == 0) {
-        colors.push_back(c);
-        n = static_cast<std::uint32_t>(colors.size());
-      }
-      index[t] = n - 1;
-    }
+// The distinct colours, in order of appearance.
+class Palette {
+ public:
+  Palette(const MeshLayers& mesh, const Context& context) : number_(std::size_t{1} << 24, 0) {
+    mesh.each(
+        [&](const MeshLayer& layer) {
+          for (const Rgb c : layer.colors) {
+            std::uint32_t& n = number_[place(c)];
+            if (n != 0) continue;
+            colors_.push_back(c);
+            n = static_cast<std::uint32_t>(colors_.size());
+          }
+        },
+        context);
   }
+  [[nodiscard]] const std::vector<Rgb>& colors() const { return colors_; }
+  [[nodiscard]] std::uint32_t index(Rgb c) const { return number_[place(c)] - 1; }
+
+ private:
+  static std::size_t place(Rgb c) { return (std::size_t{c.r} << 16) | (std::size_t{c.g} << 8) | c.b; }
+  std::vector<Rgb> colors_;
+  std::vector<std::uint32_t> number_;  // by colour, from 1
 };
 
 }  // namespace
@@ -237,8 +243,8 @@ MeshFile read_3mf(const Source& source, const Context& context) { return ThreeMf
 
 // Why not lib3mf's writer: it prints six digits behind the point, whatever the size of the number (1e-7 becomes 0),
 // puts random UUIDs into the file, and holds a second copy of the mesh.
-void write_3mf(OutputFile& file, const Mesh& mesh, const Context& context) {
-  if (mesh.vertices.size() > 0x7fffffffu)
+void write_3mf(OutputFile& file, const MeshLayers& mesh, const Context& context) {
+  if (mesh.vertices() > 0x7fffffffu)
     throw Error(Code::TooLarge, "a 3MF mesh has at most 2,147,483,647 vertices", "", "write .stl or .ply");
   ZipWriter zip(file);
   zip.add("[Content_Types].xml",
@@ -260,51 +266,46 @@ void write_3mf(OutputFile& file, const Mesh& mesh, const Context& context) {
 <metadata name="Application">Fibrolite</metadata>
 <resources>
 )";
-  std::vector<std::uint32_t> color;
-  if (!mesh.triangle_colors.empty()) {
-    Palette palette(mesh.triangle_colors);
+  std::optional<Palette> palette;
+  if (mesh.colored()) {
+    palette.emplace(mesh, context.part(0, 0, ""));
     begin += "<basematerials id=\"2\">\n";
-    for (const Rgb c : palette.colors) begin += "<base name=\"" + hex(c) + "\" displaycolor=\"" + hex(c) + "\"/>\n";
+    for (const Rgb c : palette->colors()) begin += "<base name=\"" + hex(c) + "\" displaycolor=\"" + hex(c) + "\"/>\n";
     begin += "</basematerials>\n<object id=\"1\" type=\"model\" pid=\"2\" pindex=\"0\">\n";
-    color = std::move(palette.index);
   } else {
     begin += "<object id=\"1\" type=\"model\">\n";
   }
-  std::vector<DeflatedPiece> pieces{deflate_piece(begin + "<mesh>\n<vertices>\n")};
-  for_chunks_in_order(
-      mesh.vertices.size(), context, 0, 0.4,
-      [&](std::string& text, std::size_t i) {
-        const Vec3f p = mesh.vertices[i];
-        text += "<vertex x=\"";
-        append_number(text, p.x);
-        text += "\" y=\"";
-        append_number(text, p.y);
-        text += "\" z=\"";
-        append_number(text, p.z);
-        text += "\"/>\n";
-      },
-      DeflateChunks{pieces});
-  pieces.push_back(deflate_piece("</vertices>\n<triangles>\n"));
-  for_chunks_in_order(
-      mesh.triangles.size(), context, 0.4, 0.95,
-      [&](std::string& text, std::size_t t) {
-        const auto& [a, b, c] = mesh.triangles[t];
-        text += "<triangle v1=\"";
-        append_number(text, std::uint64_t{a});
-        text += "\" v2=\"";
-        append_number(text, std::uint64_t{b});
-        text += "\" v3=\"";
-        append_number(text, std::uint64_t{c});
-        if (!color.empty()) {
-          text += "\" pid=\"2\" p1=\"";
-          append_number(text, std::uint64_t{color[t]});
-        }
-        text += "\"/>\n";
-      },
-      DeflateChunks{pieces});
-  pieces.push_back(deflate_piece(
+  zip.open("3D/3dmodel.model");
+  zip.append(deflate_piece(begin + "<mesh>\n<vertices>\n"));
+  const auto vertex = [](std::string& text, Vec3f p) {
+    text += "<vertex x=\"";
+    append_number(text, p.x);
+    text += "\" y=\"";
+    append_number(text, p.y);
+    text += "\" z=\"";
+    append_number(text, p.z);
+    text += "\"/>\n";
+  };
+  for_vertices(mesh, context.part(0, 0.4, ""), vertex, DeflateChunks{zip});
+  zip.append(deflate_piece("</vertices>\n<triangles>\n"));
+  const auto triangle = [&](std::string& text, const MeshLayer& layer, std::size_t t) {
+    const auto& [a, b, c] = layer.triangles[t];
+    text += "<triangle v1=\"";
+    append_number(text, std::uint64_t{a});
+    text += "\" v2=\"";
+    append_number(text, std::uint64_t{b});
+    text += "\" v3=\"";
+    append_number(text, std::uint64_t{c});
+    if (palette) {
+      text += "\" pid=\"2\" p1=\"";
+      append_number(text, std::uint64_t{palette->index(layer.colors[t])});
+    }
+    text += "\"/>\n";
+  };
+  for_triangles(mesh, context.part(0.4, 1, ""), triangle, DeflateChunks{zip});
+  zip.append(deflate_piece(
       "</triangles>\n</mesh>\n</object>\n</resources>\n<build>\n<item objectid=\"1\"/>\n</build>\n</model>\n"));
-  zip.add("3D/3dmodel.model", std::move(pieces));
+  zip.close();
   zip.finish();
 }
 

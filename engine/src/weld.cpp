@@ -30,7 +30,7 @@ struct Entry {
 
 // Writes to `id` the first vertex with the same coordinates, for each vertex of
 // one bucket (in rising order).
-void weld_bucket(const std::vector<Vec3f>& vertices, const Entry* begin, const Entry* end, std::vector<Entry>& table,
+void weld_bucket(std::span<const Vec3f> vertices, const Entry* begin, const Entry* end, std::vector<Entry>& table,
                  std::vector<std::uint32_t>& id) {
   const auto mask = std::bit_ceil(static_cast<std::size_t>(end - begin) * 2 + 1) - 1;
   table.assign(mask + 1, Entry{0, none});
@@ -46,7 +46,7 @@ void weld_bucket(const std::vector<Vec3f>& vertices, const Entry* begin, const E
 
 }  // namespace
 
-Weld weld(const std::vector<Vec3f>& vertices) {
+std::vector<std::uint32_t> first_equal(std::span<const Vec3f> vertices) {
   const std::size_t n = vertices.size();
   const std::size_t chunks = (n + chunk_size - 1) / chunk_size;
   // Buckets by the top bits of the hash, small enough that their tables stay in
@@ -76,8 +76,7 @@ Weld weld(const std::vector<Vec3f>& vertices) {
   }
   start[buckets] = sum;
 
-  Weld result;
-  result.id.resize(n);
+  std::vector<std::uint32_t> id(n);
   {
     std::vector<Entry> entries(n);
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
@@ -89,12 +88,18 @@ Weld weld(const std::vector<Vec3f>& vertices) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, buckets), [&](const tbb::blocked_range<std::size_t>& range) {
       std::vector<Entry> table;
       for (std::size_t bucket = range.begin(); bucket < range.end(); ++bucket)
-        weld_bucket(vertices, entries.data() + start[bucket], entries.data() + start[bucket + 1], table, result.id);
+        weld_bucket(vertices, entries.data() + start[bucket], entries.data() + start[bucket + 1], table, id);
     });
   }
+  return id;
+}
+
+Weld weld(const std::vector<Vec3f>& vertices) {
+  Weld result{first_equal(vertices), 0};
   // A first vertex comes before its copies, so one pass in order turns first
   // vertices into numbers.
-  for (std::size_t v = 0; v < n; ++v) result.id[v] = result.id[v] == v ? result.count++ : result.id[result.id[v]];
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    result.id[v] = result.id[v] == v ? result.count++ : result.id[result.id[v]];
   return result;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "fibrolite/mesh.h"
@@ -18,5 +19,7 @@ struct Weld {
 };
 /// Cost: O(n), parallel, about 12 bytes per vertex at its peak.
 Weld weld(const std::vector<Vec3f>& vertices);
+/// For each the first that has its coordinates. Cost: as weld().
+std::vector<std::uint32_t> first_equal(std::span<const Vec3f> vertices);
 
 }  // namespace fibrolite

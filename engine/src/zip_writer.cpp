@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "fibrolite/error.h"
@@ -19,23 +20,6 @@ constexpr std::uint16_t time = 0, date = 0x21;  // 1980-01-01 00:00, the earlies
 constexpr int level = 4;
 // An empty last block in fixed Huffman codes: ends the stream that the pieces make.
 constexpr std::string_view end_of_stream{"\x03\x00", 2};
-
-// The fields that the local header and the directory share.
-std::string common_fields(std::uint16_t method, std::uint32_t crc, std::uint32_t size, std::uint32_t raw_size,
-                          std::size_t name_size) {
-  std::string text;
-  append_bytes(text, version);
-  append_bytes(text, std::uint16_t{0});  // flags
-  append_bytes(text, method);
-  append_bytes(text, time);
-  append_bytes(text, date);
-  append_bytes(text, crc);
-  append_bytes(text, size);
-  append_bytes(text, raw_size);
-  append_bytes(text, static_cast<std::uint16_t>(name_size));
-  append_bytes(text, std::uint16_t{0});  // extra field
-  return text;
-}
 
 std::uint32_t narrow(std::uint64_t value) {
   if (value >= std::numeric_limits<std::uint32_t>::max())
@@ -75,43 +59,79 @@ DeflatedPiece stored_piece(std::string bytes) {
   return piece;
 }
 
-void ZipWriter::add(const std::string& name, const std::vector<DeflatedPiece>& pieces) {
-  std::uint64_t size = end_of_stream.size(), raw_size = 0;
-  uLong crc = 0;
-  for (const DeflatedPiece& piece : pieces) {
-    size += piece.bytes.size();
-    raw_size += piece.raw_size;
-    crc = crc32_combine(crc, piece.crc, static_cast<z_off_t>(piece.raw_size));
-  }
-  begin_entry(name, method_deflate, static_cast<std::uint32_t>(crc), size, raw_size);
-  for (const DeflatedPiece& piece : pieces) file_->write(piece.bytes);
-  file_->write(end_of_stream);
+void ZipWriter::Entry::count(const DeflatedPiece& piece) {
+  crc = static_cast<std::uint32_t>(crc32_combine(crc, piece.crc, static_cast<z_off_t>(piece.raw_size)));
+  size += piece.bytes.size();
+  raw_size += piece.raw_size;
 }
 
-void ZipWriter::add_stored(const std::string& name, const DeflatedPiece& piece) {
-  begin_entry(name, method_store, piece.crc, piece.bytes.size(), piece.raw_size);
+std::string ZipWriter::Entry::fields() const {
+  std::string text;
+  append_bytes(text, version);
+  append_bytes(text, std::uint16_t{0});  // flags
+  append_bytes(text, method);
+  append_bytes(text, time);
+  append_bytes(text, date);
+  append_bytes(text, crc);
+  append_bytes(text, narrow(size));
+  append_bytes(text, narrow(raw_size));
+  append_bytes(text, static_cast<std::uint16_t>(name.size()));
+  append_bytes(text, std::uint16_t{0});  // extra field
+  return text;
+}
+
+void ZipWriter::add(const std::string& name, const std::vector<DeflatedPiece>& pieces) {
+  Entry entry{name, method_deflate, 0, end_of_stream.size(), 0};
+  for (const DeflatedPiece& piece : pieces) entry.count(piece);
+  begin(entry);
+  for (const DeflatedPiece& piece : pieces) file_->write(piece.bytes);
+  file_->write(end_of_stream);
+  end(entry);
+}
+
+void ZipWriter::open(const std::string& name) {
+  open_ = {name, method_deflate, 0, end_of_stream.size(), 0};
+  begin(open_);
+}
+
+void ZipWriter::append(const DeflatedPiece& piece) {
+  open_.count(piece);
   file_->write(piece.bytes);
 }
 
-void ZipWriter::begin_entry(const std::string& name, std::uint16_t method, std::uint32_t crc, std::uint64_t size,
-                            std::uint64_t raw_size) {
+void ZipWriter::close() {
+  file_->write(end_of_stream);
+  const std::string fields = open_.fields();
+  file_->overwrite(offset_ + sizeof local_signature, std::as_bytes(std::span(fields)));
+  end(open_);
+}
+
+void ZipWriter::add_stored(const std::string& name, const DeflatedPiece& piece) {
+  Entry entry{name, method_store, 0, 0, 0};
+  entry.count(piece);
+  begin(entry);
+  file_->write(piece.bytes);
+  end(entry);
+}
+
+void ZipWriter::begin(const Entry& entry) {
   if (entries_ == std::numeric_limits<std::uint16_t>::max())
     throw Error(Code::TooLarge, "the archive would have more than 65535 entries");
-  const std::string fields = common_fields(method, crc, narrow(size), narrow(raw_size), name.size());
   std::string header;
   append_bytes(header, local_signature);
-  header += fields + name;
+  file_->write(header + entry.fields() + entry.name);
+}
 
+void ZipWriter::end(const Entry& entry) {
+  const std::string fields = entry.fields();
   append_bytes(directory_, directory_signature);
   append_bytes(directory_, version);
   directory_ += fields;
   directory_.append(10, '\0');  // comment size, disk, attributes
   append_bytes(directory_, narrow(offset_));
-  directory_ += name;
+  directory_ += entry.name;
   ++entries_;
-
-  file_->write(header);
-  offset_ += header.size() + size;
+  offset_ += sizeof local_signature + fields.size() + entry.name.size() + entry.size;
 }
 
 void ZipWriter::finish() {

@@ -30,15 +30,30 @@ class ZipWriter {
   /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB, or 65536 entries.
   void add(const std::string& name, const std::vector<DeflatedPiece>& pieces);
   void add(const std::string& name, std::string_view text) { add(name, {deflate_piece(text)}); }
+  /// The same piece by piece, for an entry that need not be in memory.
+  void open(const std::string& name);
+  void append(const DeflatedPiece& piece);
+  void close();
   /// One stored_piece() as an entry.
   void add_stored(const std::string& name, const DeflatedPiece& piece);
   /// The directory. Last.
   void finish();
 
  private:
-  void begin_entry(const std::string& name, std::uint16_t method, std::uint32_t crc, std::uint64_t size,
-                   std::uint64_t raw_size);
+  struct Entry {
+    std::string name;
+    std::uint16_t method = 0;
+    std::uint32_t crc = 0;
+    std::uint64_t size = 0, raw_size = 0;
+
+    void count(const DeflatedPiece& piece);
+    /// What the local header and the directory share. @throws Error TooLarge.
+    [[nodiscard]] std::string fields() const;
+  };
+  void begin(const Entry& entry);
+  void end(const Entry& entry);
   OutputFile* file_;
+  Entry open_;
   std::uint64_t offset_ = 0;
   std::string directory_;
   std::uint16_t entries_ = 0;

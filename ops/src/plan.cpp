@@ -2,6 +2,7 @@
 // What a run will need, known before it starts.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "fibrolite/ops/hybridize.h"
@@ -75,10 +76,15 @@ constexpr double bytes_a_sample = 4.2;
 /// some samples change.
 constexpr double body_times = 1.4, solid_times = 2.8;
 
-double fixed_bytes(const Mesh& model, InfillKind infill) {
-  const double deciding = infill == InfillKind::Hybrid ? 150e6 : 0;  // the proxy's finite elements
-  return 95e6 + deciding + 400.0 * static_cast<double>(model.triangles.size());
-}
+/// All fits lie above what was measured by this at least.
+constexpr double safety = 1.12;
+
+double fixed_bytes(const Mesh& model) { return 100e6 + 400.0 * static_cast<double>(model.triangles.size()); }
+/// Of the proxy's finite elements. What they leave behind is used again for voxels, hardly for a mesh.
+double deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 150e6 : 0; }
+
+/// Of the layers of a surface that are worked on at once: eight of some 100 bytes a vertex.
+double layers_bytes(double triangles_a_layer) { return 8 * 50 * triangles_a_layer; }
 
 /// Surface and volume of the model in each block of 8 samples along an axis.
 struct Profile {
@@ -129,33 +135,40 @@ Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, Inf
   result.active_voxels = d.active_a_face_mm2 * faces_mm2;
   result.triangles = d.triangles_a_face_mm2 * faces_mm2;
   // The body is gone when the surface is made, which takes thirty bytes a triangle.
-  result.memory_bytes =
-      fixed_bytes(model, infill) + std::max(body_times * body + solid_times * solid, solid + 30 * result.triangles);
+  const double voxels = body_times * body + solid_times * solid, mesh = solid + 30 * result.triangles;
+  result.memory_bytes = fixed_bytes(model) + std::max(safety * voxels, deciding_bytes(infill) + safety * mesh);
   return result;
 }
 
-SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, int axis,
-                    double margin_mm, double allowed_bytes) {
-  const Profile p = profile(model, voxel_mm, axis);
+SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const SlabNeeds& needs,
+                    double allowed_bytes) {
+  constexpr double most_blocks = 1e6;  // no machine has the memory for one of such slabs
+  if (!(bounds(model).size()[needs.axis] < most_blocks * 8 * voxel_mm))
+    return {.axis = needs.axis, .memory_bytes = std::numeric_limits<double>::infinity()};
+  const Profile p = profile(model, voxel_mm, needs.axis);
   const Density d = density(voxel_mm, recipe, infill);
   const auto count = static_cast<int>(p.area_mm2.size());
-  SlabPlan plan{.axis = axis};
+  SlabPlan plan{.axis = needs.axis};
   // The print checks look through walls and gaps up to their limits, and some voxels on.
   const PrintParams& limits = recipe.print;
   const double checked_mm = limits.check ? std::max(limits.wall_mm, limits.gap_mm) + 5 * voxel_mm : 0;
-  const int margin = std::max(1, static_cast<int>(std::ceil(std::max(margin_mm, checked_mm) / (8 * voxel_mm))));
+  const int margin = std::max(1, static_cast<int>(std::ceil(std::max(needs.margin_mm, checked_mm) / (8 * voxel_mm))));
   plan.margin_vox = 8 * margin;
   std::vector<double> sum{0};
+  double largest_layer = 0;  // triangles
   for (std::size_t i = 0; i < p.area_mm2.size(); ++i) {
     const double faces_mm2 = d.faces_a_mm2 * p.area_mm2[i] + d.faces_a_mm3 * p.volume_mm3[i];
-    sum.push_back(sum.back() + bytes_a_sample * (body_times * d.body_a_mm2 * p.area_mm2[i] +
-                                                 solid_times * d.samples_a_face_mm2 * faces_mm2));
+    sum.push_back(sum.back() +
+                  safety * bytes_a_sample *
+                      (body_times * d.body_a_mm2 * p.area_mm2[i] + solid_times * d.samples_a_face_mm2 * faces_mm2));
+    largest_layer = std::max(largest_layer, d.triangles_a_face_mm2 * faces_mm2);
   }
   const auto bytes = [&](int from, int to) {
     return sum[static_cast<std::size_t>(std::min(to + margin, count))] -
            sum[static_cast<std::size_t>(std::max(from - margin, 0))];
   };
-  const double fixed = fixed_bytes(model, infill);
+  plan.memory_bytes = fixed_bytes(model) + 1.6 * deciding_bytes(infill);  // while it decides
+  const double fixed = fixed_bytes(model) + (needs.surface ? layers_bytes(largest_layer) : 0);
   plan.borders.push_back(8 * p.first);
   for (int from = 0; from < count;) {
     int to = from + 1;

@@ -62,25 +62,21 @@ struct SolidStream::Impl {
   /// each loose thing is looked at with what lies around it alone.
   void make_one_piece(const Context& context) {
     const TieParams params = tie_params(design.recipe, design.infill, everything(), grid.voxel_mm);
-    bool fresh = true;  // the sweeps have seen all struts
-    for (int round = 0; round <= rounds; ++round) {
+    for (int round = 0;; ++round) {
       sweep(params, context);
       if (found.left.material.empty()) {
         throw Error(Code::BadInput, "the mesh encloses no volume at this voxel", {},
                     "close it, give it thickness, or use a smaller --voxel");
       }
-      if (round == rounds || found.left.material.size() == 1) break;
-      fresh = !tie_loose(params, context);
-      if (fresh) break;
+      if (round == rounds || found.left.material.size() == 1 || !tie_loose(params, context)) break;
     }
     for (int round = 0; params.neck_mm > 0; ++round) {
-      if (!fresh) sweep(params, context);
       std::vector<Piece> left;
       if (!tie_necks(params, round < rounds, left, context)) {
         made.tied.unreached = std::move(left);
         break;
       }
-      fresh = false;
+      sweep(params, context);
     }
     if (found.filled > 0 && found.left.material.size() > 1) recount(context);
     made.tied.dropped = found.dropped;
@@ -183,19 +179,22 @@ struct SolidStream::Impl {
   }
 
   Slab slab(std::size_t number, const Context& context) {
-    Slab result{range(number), body(number, plan.margin_vox, quiet(context)), {}, {}};
+    Slab result{range(number), number, body(number, plan.margin_vox, quiet(context)), {}};
     context.check();
     result.solid = flipped(raw(result.body, quiet(context)), found.flips);
     context.check();
     if (!measured[number]) measure(number, result, context);
+    return result;
+  }
+
+  [[nodiscard]] Shape printed(const Slab& slab, const Context& context) const {
     Mended mended = made;
-    mended.tied.solid = result.solid;
+    mended.tied.solid = slab.solid;
     std::vector<Vec3i> changed;
-    const SampleRange known{plan.axis, result.range.low - plan.margin_vox, result.range.high + plan.margin_vox};
+    const SampleRange known{plan.axis, slab.range.low - plan.margin_vox, slab.range.high + plan.margin_vox};
     for (const Flips::Block& block : found.flips.blocks)
       if (known.holds(block.origin)) changed.push_back(block.origin);
-    result.printed = as_function(over(smooth_distance_to(result.body)), result.body, mended, changed, context);
-    return result;
+    return as_function(over(smooth_distance_to(slab.body)), slab.body, mended, changed, context);
   }
 
   void measure(std::size_t number, const Slab& slab, const Context& context) {
@@ -254,6 +253,7 @@ struct SolidStream::Impl {
 const SlabPlan& SolidStream::plan() const { return impl_->plan; }
 Grid SolidStream::grid() const { return impl_->grid; }
 SolidStream::Slab SolidStream::slab(std::size_t number, const Context& context) { return impl_->slab(number, context); }
+Shape SolidStream::printed(const Slab& slab, const Context& context) const { return impl_->printed(slab, context); }
 void SolidStream::finish(Report& report) const { impl_->finish(report); }
 
 SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid grid, Report& report,

@@ -128,6 +128,45 @@ TEST(Generate, OneAndTwoThreadsGiveTheSameBytes) {
   for (const json& interface : a["interfaces"]) EXPECT_EQ(interface["regions_after"], 1);
 }
 
+TEST(Generate, LessMemoryGivesTheSameFilesSlabBySlab) {
+  const TempDir whole, slabs;
+  const auto generated = [&](const TempDir& folder, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"generate", asset("molar").string(), "--infill", "tcs", "--voxel", "0.2"};
+    for (const char* ending : {"stl", "ply", "obj", "off", "3mf"})
+      arguments.insert(arguments.end(), {"-o", (folder / (std::string("part.") + ending)).string()});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  EXPECT_THAT(generated(slabs, {"--max-memory", "250M", "--dry-run"}).out, HasSubstr("slabs"));
+  generated(whole, {});
+  generated(slabs, {"--max-memory", "250M"});
+  for (const char* ending : {"stl", "ply", "obj", "off", "3mf"}) {
+    const std::string name = std::string("part.") + ending;
+    EXPECT_TRUE(content(whole / name) == content(slabs / name)) << ending;
+  }
+  const json a = report_in(whole / "part.report.json"), b = report_in(slabs / "part.report.json");
+  for (const char* block : {"model", "parts", "interfaces", "solid", "print", "mesh", "warnings"})
+    EXPECT_EQ(a[block], b[block]) << block;
+  EXPECT_EQ(b["mesh"]["boundary_edges"], 0);
+  for (const json& stage : b["stages"]) EXPECT_LE(stage["peak_rss_mb"], 250 * 1.048576);
+  EXPECT_EQ(names_in(slabs.path()).size(), 6U);  // nothing stays behind
+}
+
+TEST(Generate, WhatNeedsTheWholeSolidIsRefusedIfItDoesNotFit) {
+  const TempDir folder;
+  const auto refused = [&](const std::string& output, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"generate", asset("molar").string(), "--infill", "tcs", "--voxel",
+                                       "0.2",      "--max-memory",          "250M",     "-o",  folder / output};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return refused_run(arguments, 5, folder.path());
+  };
+  EXPECT_THAT(refused("part.vdb", {}), HasSubstr("part.vdb needs the whole solid"));
+  EXPECT_THAT(refused("part.stl", {"--fix"}), HasSubstr("--fix needs the whole solid"));
+  EXPECT_THAT(refused("part.stl", {"--steps", folder / "steps.vdb"}), HasSubstr("--steps needs the whole solid"));
+  EXPECT_THAT(refused("part.stl", {"--picture", folder / "a.png"}), HasSubstr("--picture needs the whole solid"));
+  EXPECT_THAT(refused("part.stl", {"--set", "print.drain_mm=2"}), HasSubstr("print.drain_mm needs the whole solid"));
+}
+
 TEST(Generate, OverwriteReplacesAndAFailedRunKeepsTheOld) {
   const TempDir folder;
   std::ofstream(folder / "a.stl") << "old";

@@ -175,6 +175,12 @@ TEST_F(SlicingRefused, MoreThanTheFormatHolds) {
   EXPECT_THAT(refused({"--pixel", "1e-4"}, OutOfMemory), HasSubstr("pixel"));
   EXPECT_THAT(refused({"--pixel", "0.001", "--max-memory", "300M"}, OutOfMemory), HasSubstr("20000 x 20000 pixels"));
 }
+TEST_F(SlicingRefused, DrainHolesOfASolidThatDoesNotFit) {
+  const std::string said =
+      refused({"--size", "400", "--layer", "5", "--pixel", "1", "--max-memory", "250M", "--set", "print.drain_mm=2"},
+              OutOfMemory);
+  EXPECT_THAT(said, HasSubstr("print.drain_mm needs the whole solid"));
+}
 TEST_F(SlicingRefused, FilesAndModels) {
   refused({}, Usage, "out.png");
   refused({}, NoOutput, "nowhere/out.zip");

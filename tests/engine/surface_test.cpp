@@ -5,13 +5,18 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "dual_surface.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
 #include "mesh_checks.h"
+#include "models.h"
 
 namespace fibrolite {
 namespace {
@@ -70,19 +75,85 @@ TEST(Surface, of_noise_is_closed_and_manifold) {
   EXPECT_EQ(count.degenerate_triangles, 0);
 }
 
-TEST(DualSurface, slabs_give_the_same_quads_in_the_same_order) {
+/// What a layer at a time says must be what all at once says.
+std::vector<std::int64_t> counts(const MeshCheck& c) {
+  return {
+      c.triangles, c.vertices, c.boundary_edges, c.nonmanifold_edges, c.nonmanifold_vertices, c.degenerate_triangles,
+      c.shells};
+}
+
+TEST(SurfaceLayers, of_slabs_are_the_whole_surface_vertex_for_vertex) {
   const Shape noise(std::make_shared<const Noise>());
   const Solid solid = realize(intersect({noise, sphere({0, 0, 0}, 3)}), box, {.voxel_mm = 0.125});
-  for (const int axis : {0, 1, 2}) {
-    const QuadSurface whole = dual_surface(solid, axis, {});
-    ASSERT_GT(whole.quads.size(), 10000U);
-    for (const int thickness : {8, 24}) {
-      DualSurface sweep(solid.grid(), axis);
-      QuadSurface parts;
-      for (int at = -40; at < 40; at += thickness) sweep.add(solid, {axis, at, at + thickness}, parts, {});
-      EXPECT_EQ(parts.points, whole.points);
-      EXPECT_EQ(parts.quads, whole.quads);
+  const testing::TempDir folder;
+  for (const bool keep_volume : {true, false}) {
+    for (const int axis : {0, 1, 2}) {
+      const SurfaceParams params{.keep_volume = keep_volume, .axis = axis};
+      const Mesh whole = surface(solid, params);
+      ASSERT_GT(whole.triangles.size(), 20000U);
+      for (const int thickness : {8, 24}) {
+        const auto scratch = thickness == 8 ? std::optional(folder.path()) : std::nullopt;
+        SurfaceLayers layers(solid.grid(), params, scratch);
+        for (int at = -40; at < 40; at += thickness) layers.add(solid, {axis, at, at + thickness});
+        layers.finish(solid.volume_mm3());
+        const Mesh mesh = gathered(layers);
+        EXPECT_TRUE(mesh.vertices == whole.vertices) << axis << ' ' << thickness;
+        EXPECT_TRUE(mesh.triangles == whole.triangles) << axis << ' ' << thickness;
+        EXPECT_EQ(layers.vertices(), whole.vertices.size());
+        EXPECT_EQ(layers.triangles(), whole.triangles.size());
+        const MeshCheck at_once = check(whole), by_layers = check(layers);
+        EXPECT_EQ(counts(by_layers), counts(at_once));
+        EXPECT_NEAR(by_layers.volume_mm3, at_once.volume_mm3, 1e-9 * at_once.volume_mm3);
+      }
     }
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+/// Layers with a fault in each: a hole, a triangle turned over, one there twice, or a vertex at the place of one in the
+/// layer before.
+class Faulty final : public MeshLayers {
+ public:
+  Faulty(const MeshLayers& layers, int fault) : layers_(layers), fault_(fault) {}
+  [[nodiscard]] std::size_t vertices() const override { return layers_.vertices(); }
+  [[nodiscard]] std::size_t triangles() const override { return layers_.triangles(); }
+  void each(const std::function<void(const MeshLayer&)>& use, const Context& context) const override {
+    Vec3f moved{};  // the first vertex of the layer before
+    layers_.each(
+        [&](const MeshLayer& layer) {
+          std::vector<Vec3f> vertices(layer.vertices.begin(), layer.vertices.end());
+          std::vector<Mesh::Triangle> triangles(layer.triangles.begin(), layer.triangles.end());
+          if (fault_ == 0 && !triangles.empty()) triangles.pop_back();
+          if (fault_ == 1 && !triangles.empty()) std::swap(triangles.front()[0], triangles.front()[1]);
+          if (fault_ == 2 && !triangles.empty()) triangles.push_back(triangles.front());
+          if (fault_ == 3 && layer.before > 1 && layer.before < vertices.size()) {
+            vertices[0] = moved;
+            vertices[layer.before] = vertices[layer.before - 1];
+            moved = vertices[layer.before];
+          } else if (layer.before < vertices.size()) {
+            moved = vertices[layer.before];
+          }
+          use({vertices, layer.first, layer.before, triangles, {}});
+        },
+        context);
+  }
+
+ private:
+  const MeshLayers& layers_;
+  int fault_;
+};
+
+TEST(SurfaceLayers, check_finds_what_is_wrong_in_any_layers) {
+  // A mesh with every fault, cut into layers anywhere.
+  const Solid solid = realize(torus({}, 7, 2), box, {.voxel_mm = 0.25});
+  SurfaceLayers layers(solid.grid());
+  layers.add(solid);
+  layers.finish(solid.volume_mm3());
+  for (int fault = 0; fault < 4; ++fault) {
+    const Faulty faulty(layers, fault);
+    const MeshCheck by_layers = check(faulty);
+    EXPECT_EQ(counts(by_layers), counts(check(gathered(faulty)))) << fault;
+    EXPECT_NE(counts(by_layers), counts(check(layers))) << fault;
   }
 }
 

@@ -53,7 +53,8 @@ void expect_same_samples(const SolidStream::Slab& slab, const Solid& whole) {
   }
 }
 
-void expect_same_function(const SolidStream::Slab& slab, const Shape& whole, const Box3d& box, double voxel_mm) {
+void expect_same_function(const SolidStream::Slab& slab, const Shape& printed, const Shape& whole, const Box3d& box,
+                          double voxel_mm) {
   Random random(slab.range.low, "points");
   Vec3d low = box.min, high = box.max;
   (slab.range.axis == 0 ? low.x : slab.range.axis == 1 ? low.y : low.z) = slab.range.low * voxel_mm;
@@ -61,7 +62,7 @@ void expect_same_function(const SolidStream::Slab& slab, const Shape& whole, con
   for (int i = 0; i < 300; ++i) {
     const double x = random.uniform(), y = random.uniform(), z = random.uniform();
     const Vec3d p = low + Vec3d{x * (high.x - low.x), y * (high.y - low.y), z * (high.z - low.z)};
-    ASSERT_EQ(slab.printed(p), whole(p)) << p.x << " " << p.y << " " << p.z;
+    ASSERT_EQ(printed(p), whole(p)) << p.x << " " << p.y << " " << p.z;
   }
 }
 
@@ -115,7 +116,7 @@ Report expect_same_in_slabs(const Mesh& mesh, const HybridizeParams& params, int
   for (std::size_t i = 0; i < stream.slabs(); ++i) {
     const SolidStream::Slab slab = stream.slab(falling ? stream.slabs() - 1 - i : i);
     expect_same_samples(slab, whole.hybrid.solid);
-    expect_same_function(slab, whole.hybrid.printed, bounds(mesh), *params.voxel_mm);
+    expect_same_function(slab, stream.printed(slab), whole.hybrid.printed, bounds(mesh), *params.voxel_mm);
   }
   stream.finish(streamed.report);
   expect_same_report(streamed.report, whole.report);
@@ -151,7 +152,7 @@ TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {
   const double h = 0.1;
   std::size_t last = 1000000;
   for (const double bytes : {250e6, 400e6, 3000e6}) {
-    const SlabPlan plan = plan_slabs(mesh, h, recipe, InfillKind::Tcs, 2, 1.0, bytes);
+    const SlabPlan plan = plan_slabs(mesh, h, recipe, InfillKind::Tcs, {2, 1.0}, bytes);
     EXPECT_LE(plan.memory_bytes, bytes);
     EXPECT_LT(plan.borders.size(), last);
     last = plan.borders.size();
@@ -161,7 +162,7 @@ TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {
     EXPECT_TRUE(std::is_sorted(plan.borders.begin(), plan.borders.end()));
     for (const int border : plan.borders) EXPECT_EQ(border % 8, 0);
   }
-  EXPECT_GT(plan_slabs(mesh, h, recipe, InfillKind::Tcs, 2, 1.0, 130e6).memory_bytes, 130e6);
+  EXPECT_GT(plan_slabs(mesh, h, recipe, InfillKind::Tcs, {2, 1.0}, 130e6).memory_bytes, 130e6);
 }
 
 }  // namespace

@@ -34,6 +34,27 @@ class OutputFile {
   std::unique_ptr<State> state_;
 };
 
+/// Bytes that wait outside of memory, in a file without a name: gone with this object, however the process ends. Not
+/// thread-safe.
+class ScratchFile {
+ public:
+  /// @throws Error Io: the folder is missing or not writable.
+  explicit ScratchFile(const std::filesystem::path& folder);
+  ~ScratchFile();
+  ScratchFile(const ScratchFile&) = delete;
+  ScratchFile& operator=(const ScratchFile&) = delete;
+
+  /// Returns where the bytes begin. @throws Error Io: disk full or any other failure of the system.
+  std::uint64_t append(std::span<const std::byte> bytes);
+  /// Bytes that were appended. @throws Error Io.
+  void read(std::uint64_t offset, std::span<std::byte> bytes) const;
+
+ private:
+  std::filesystem::path folder_;
+  int fd_ = -1;
+  std::uint64_t size_ = 0;
+};
+
 /// Remove every uncommitted file of this process; for a signal handler's orderly end.
 void discard_uncommitted_files() noexcept;
 

@@ -8,6 +8,7 @@
 
 #include "fibrolite/context.h"
 #include "fibrolite/mesh.h"
+#include "fibrolite/mesh_layers.h"
 
 namespace fibrolite {
 
@@ -30,5 +31,8 @@ struct MeshFile {
 /// back to the same floats. The same mesh gives the same bytes (3MF UUIDs are fixed).
 /// @throws Error Io: folder missing, not writable, disk full; Unsupported: unknown ending.
 void write_mesh(const std::filesystem::path& path, const Mesh& mesh, const Context& context = {});
+/// As many of the layers in memory as they come in. The same triangles in other layers give the same bytes, but in
+/// .3mf.
+void write_mesh(const std::filesystem::path& path, const MeshLayers& mesh, const Context& context = {});
 
 }  // namespace fibrolite

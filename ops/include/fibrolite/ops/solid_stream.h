@@ -22,11 +22,15 @@ struct SlabPlan {
   int margin_vox = 8;          ///< How far beyond its slab each is known; a multiple of 8.
   double memory_bytes = 0;     ///< What the run will need at most; more than allowed if 8 samples are too many.
 };
-/// Slabs as thick as the memory allows, by how much surface and lumen there is across the axis. `margin_mm`: how far
-/// beyond a slab the solid will be looked at.
+struct SlabNeeds {
+  int axis = 2;
+  double margin_mm = 0;  ///< How far beyond a slab the solid will be looked at.
+  bool surface = false;  ///< Will its surface be made, a few layers of blocks at a time (SurfaceLayers)?
+};
+/// Slabs as thick as the memory allows, by how much surface and lumen there is across the axis.
 /// Cost: O(triangles).
-[[nodiscard]] SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, int axis,
-                                  double margin_mm, double allowed_bytes);
+[[nodiscard]] SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill,
+                                  const SlabNeeds& needs, double allowed_bytes);
 
 /// Made by hybridize(). Two passes: the first, before it is made, finds loose pieces, specks and micro-voids with no
 /// more than a slab in memory; the second is the caller's, who asks for each slab. The solid is the one that
@@ -41,12 +45,14 @@ class SolidStream {
   [[nodiscard]] std::size_t slabs() const { return plan().borders.size() - 1; }
   struct Slab {
     SampleRange range;
+    std::size_t number = 0;
     Solid body, solid;  ///< With the margin.
-    Shape printed;      ///< As Hybrid::printed, good up to three voxels less than the margin beyond the slab.
   };
   /// Any slab; measured the first time, for which they must come in rising or in falling order. Cost: body and solid of
   /// the slab are made anew each time.
   [[nodiscard]] Slab slab(std::size_t number, const Context& context = {});
+  /// As Hybrid::printed, good up to three voxels less than the margin beyond the slab.
+  [[nodiscard]] Shape printed(const Slab& slab, const Context& context = {}) const;
   /// After each slab has been asked for: what was measured, as hybridize() reports it of a whole solid.
   void finish(Report& report) const;
 

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "keep_volume.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace fibrolite {
+namespace {
+
+using openvdb::Vec3s;
+
+/// Layers that are worked on at once, for the threads to share.
+constexpr std::size_t batch = 4;
+
+Vec3d to_vec(const Vec3s& v) { return {v.x(), v.y(), v.z()}; }
+
+}  // namespace
+
+void KeepVolume::add(QuadLayer&& layer, const Use& use) {
+  Work& work = window_.emplace_back();
+  static_cast<QuadLayer&>(work.layer) = std::move(layer);
+  if (window_.size() >= summed_ + batch) process(false, use);
+}
+
+void KeepVolume::finish(const Use& use) { process(true, use); }
+
+void KeepVolume::process(bool all, const Use& use) {
+  const std::size_t count = window_.size();
+  const auto each = [](std::size_t& from, std::size_t to, const auto& work) {
+    if (from < to) tbb::parallel_for(from, to, work);
+    from = std::max(from, to);
+  };
+  const auto but = [all](std::size_t n, std::size_t less) { return all ? n : n - std::min(n, less); };
+  if (moving_) {
+    each(summed_, count, [&](std::size_t n) { sum_around(n); });
+    each(settled_, but(summed_, 1), [&](std::size_t n) { settle(n); });
+    // A layer's quads reach into the one below: every other one at a time.
+    for (const std::size_t odd : {0U, 1U}) {
+      tbb::parallel_for(looked_, settled_, [&](std::size_t n) {
+        if ((n & 1U) == odd) look_around(n);
+      });
+    }
+    looked_ = settled_;
+    each(moved_, but(looked_, 1), [&](std::size_t n) { choose_moves(n); });
+  } else {
+    summed_ = settled_ = looked_ = moved_ = count;
+  }
+  std::vector<std::array<double, 4>> volumes(moved_ - split_);
+  tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t i) { volumes[i] = split(split_ + i); });
+  for (const auto& v : volumes)
+    for (std::size_t k = 0; k < 4; ++k) volume_[k] += v[k];
+  split_ = moved_;
+
+  const std::size_t done = but(split_, 1);  // the last is looked at from above
+  for (std::size_t n = 0; n < done; ++n) {
+    use(std::move(window_.front().layer));
+    window_.pop_front();
+  }
+  for (std::size_t* progress : {&summed_, &settled_, &looked_, &moved_, &split_}) *progress -= done;
+}
+
+/// Edge vectors and normals of a layer's quads, at their vertices.
+void KeepVolume::sum_around(std::size_t n) {
+  Work& work = window_[n];
+  work.mine.resize(work.layer.points.size());
+  Work* below = n > 0 ? &window_[n - 1] : nullptr;
+  if (below != nullptr) below->above.resize(below->layer.points.size());
+  const std::size_t first = work.layer.first;
+  const auto point = [&](std::uint32_t v) -> const Vec3s& {
+    return v >= first ? work.layer.points[v - first] : below->layer.points[v - below->layer.first];
+  };
+  for (const Quad& q : work.layer.quads) {
+    const std::array<Vec3s, 4> p{point(q[0]), point(q[1]), point(q[2]), point(q[3])};
+    const Vec3s normal = (p[2] - p[0]).cross(p[3] - p[1]);
+    const float length = normal.length();
+    for (std::size_t k = 0; k < 4; ++k) {
+      Umbrella& u = q[k] >= first ? work.mine[q[k] - first] : below->above[q[k] - below->layer.first];
+      const Vec3s d = p[(k + 1) & 3] + p[(k + 3) & 3] - 2.0F * p[k];
+      u.x += d.x();
+      u.y += d.y();
+      u.z += d.z();
+      u.nx += normal.x();
+      u.ny += normal.y();
+      u.nz += normal.z();
+      u.flatness += length;
+      u.edges += 2;
+    }
+  }
+}
+
+void KeepVolume::settle(std::size_t n) {
+  Work& work = window_[n];
+  for (std::size_t i = 0; i < work.mine.size(); ++i) {
+    Umbrella& u = work.mine[i];
+    if (!work.above.empty()) {
+      const Umbrella& more = work.above[i];
+      u.x += more.x, u.y += more.y, u.z += more.z;
+      u.nx += more.nx, u.ny += more.ny, u.nz += more.nz;
+      u.flatness += more.flatness;
+      u.edges += more.edges;
+    }
+    const float length = std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz), mean = 1 / std::max(u.edges, 1.0F);
+    u.x *= mean, u.y *= mean, u.z *= mean;
+    u.flatness = u.flatness > 0 ? length / u.flatness : 0;
+    u.edges = 0;
+  }
+  work.above = {};
+}
+
+/// The flattest vertex around each.
+void KeepVolume::look_around(std::size_t n) {
+  Work& work = window_[n];
+  const std::size_t first = work.layer.first;
+  for (const Quad& q : work.layer.quads) {
+    std::array<Umbrella*, 4> u;
+    float most = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      u[k] = q[k] >= first ? &work.mine[q[k] - first] : &window_[n - 1].mine[q[k] - window_[n - 1].layer.first];
+      most = std::max(most, u[k]->flatness);
+    }
+    for (Umbrella* one : u) one->edges = std::max(one->edges, most);
+  }
+}
+
+void KeepVolume::choose_moves(std::size_t n) {
+  constexpr float sharp = 0.72F, smooth = 0.86F;  // flatness of a vertex: 1 on a face, cos 45 degrees on a box's edge
+  constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
+  const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
+  Work& work = window_[n];
+  const double most = 0.35 * voxel_mm_;
+  work.layer.moves.resize(work.mine.size());
+  for (std::size_t i = 0; i < work.mine.size(); ++i) {
+    const Umbrella& u = work.mine[i];
+    const Vec3d normal = normalized(Vec3d{u.nx, u.ny, u.nz});
+    const double along = dot(Vec3d{u.x, u.y, u.z}, normal);
+    const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.edges, bent, flat);
+    const Vec3f move = to_float(std::clamp((edge - 1) * along, -most, most) * normal);
+    work.layer.moves[i] = Vec3s(move.x, move.y, move.z);
+  }
+  work.mine = {};
+}
+
+/// Turns the quads for their diagonals, the shorter ones after a whole move; returns what they add to the volume.
+std::array<double, 4> KeepVolume::split(std::size_t n) {
+  MovableLayer& layer = window_[n].layer;
+  const MovableLayer* below = n > 0 ? &window_[n - 1].layer : nullptr;
+  std::array<double, 4> sum{};
+  for (Quad& q : layer.quads) {
+    std::array<Vec3d, 4> p, m{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const MovableLayer& of = q[k] >= layer.first ? layer : *below;
+      p[k] = to_vec(of.points[q[k] - of.first]);
+      if (moving_) m[k] = to_vec(of.moves[q[k] - of.first]);
+    }
+    const Vec3d first = p[2] + m[2] - p[0] - m[0], second = p[3] + m[3] - p[1] - m[1];
+    std::size_t a = 0;
+    if (dot(first, first) > dot(second, second)) {
+      q = {q[3], q[0], q[1], q[2]};
+      a = 3;
+    }
+    const std::size_t b = (a + 1) & 3, c = (a + 2) & 3, d = (a + 3) & 3;
+    // Both triangles: a . (c x (d - b)), each corner p + step m.
+    const Vec3d across = p[d] - p[b];
+    const Vec3d x0 = cross(p[c], across);
+    sum[0] += dot(p[a], x0);
+    if (!moving_) continue;
+    const Vec3d across_more = m[d] - m[b];
+    const Vec3d x1 = cross(m[c], across) + cross(p[c], across_more), x2 = cross(m[c], across_more);
+    sum[1] += dot(m[a], x0) + dot(p[a], x1);
+    sum[2] += dot(m[a], x1) + dot(p[a], x2);
+    sum[3] += dot(m[a], x2);
+  }
+  return sum;
+}
+
+double KeepVolume::step(double wanted_mm3) const {
+  const auto missing = [&](double s) {
+    return volume_[0] + s * (volume_[1] + s * (volume_[2] + s * volume_[3])) - 6 * wanted_mm3;
+  };
+  double low = 0, high = 2;
+  if ((missing(low) < 0) == (missing(high) < 0)) {
+    // A field that is no distance may hold a volume that no such move can reach.
+    double best = 1;
+    for (const double s : {low, high})
+      if (std::abs(missing(s)) < std::abs(missing(best))) best = s;
+    return best;
+  }
+  const bool rising = missing(low) < 0;
+  for (int round = 0; round < 50; ++round) {
+    const double middle = (low + high) / 2;
+    ((missing(middle) < 0) == rising ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
+}  // namespace fibrolite
