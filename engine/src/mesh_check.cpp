@@ -236,12 +236,43 @@ class Checker {
     });
   }
 
+  /// Nearly every vertex: its triangles follow each other around it once, each edge in both directions. Joins them and
+  /// says true; else does nothing.
+  bool closed_fan(std::uint32_t v, std::uint32_t begin, std::uint32_t count) const {
+    constexpr std::uint32_t most = 24;
+    if (count < 3 || count > most) return false;
+    struct Side {
+      std::uint32_t out, in, triangle;
+    };
+    std::array<Side, most> fan;
+    for (std::uint32_t c = 0; c < count; ++c) {
+      const std::uint32_t triangle = corners_[begin + c] / 3, i = corners_[begin + c] % 3;
+      const auto& corners = triangles_[triangle].corners;
+      fan[c] = {corners[i == 2 ? 0 : i + 1], corners[i == 0 ? 2 : i - 1], triangle};
+    }
+    for (std::uint32_t c = 0; c + 1 < count; ++c) {
+      std::uint32_t next = 0, matches = fan[0].out == fan[c].in ? 1 : 0;  // more than one: three or more at an edge
+      for (std::uint32_t i = c + 1; i < count; ++i) {
+        if (fan[i].out != fan[c].in) continue;
+        next = i;
+        ++matches;
+      }
+      if (next == 0 || matches > 1) return false;
+      std::swap(fan[c + 1], fan[next]);
+    }
+    if (fan[0].out != fan[count - 1].in) return false;
+    for (std::uint32_t c = 0; c < count; ++c)
+      if (v < fan[c].in) shells_->join(fan[c].triangle, fan[c + 1 < count ? c + 1 : 0].triangle);
+    return true;
+  }
+
   // Judges one vertex and the edges to vertices with greater numbers, and joins
   // the triangles along those.
   void visit(std::uint32_t v, Tally& tally) const {
     const std::uint32_t begin = starts_[v - first_], count = starts_[v - first_ + 1] - begin;
     if (count == 0) return;
     ++tally.vertices;
+    if (closed_fan(v, begin, count)) return;
     tally.arcs.clear();
     tally.fan.resize(count);
     for (std::uint32_t c = 0; c < count; ++c) {

@@ -282,22 +282,28 @@ void PieceSweep::add(const Solid& solid, int low, int high, const Shape& anchor,
 
 PieceSweep::Result PieceSweep::finish() { return impl_->finish(); }
 
-Solid flipped(const Solid& solid, const Flips& flips) {
+Solid flipped(Solid solid, const Flips& flips) {
   const Tree& from = solid.impl().grid->tree();
-  openvdb::FloatGrid::Ptr grid;
+  const auto known = [&](const Flips::Block& block) {
+    return block.tile || from.probeConstLeaf({block.origin.x, block.origin.y, block.origin.z}) != nullptr;
+  };
+  if (std::none_of(flips.blocks.begin(), flips.blocks.end(), known)) return solid;
+  const Grid spec = solid.grid();
+  const openvdb::FloatGrid::Ptr grid = editable(std::move(solid));
+  Tree& tree = grid->tree();
   for (const Flips::Block& block : flips.blocks) {
     const Coord origin(block.origin.x, block.origin.y, block.origin.z);
-    if (!block.tile && from.probeConstLeaf(origin) == nullptr) continue;
-    if (grid == nullptr) grid = solid.impl().grid->deepCopy();
     if (block.tile) {
-      grid->tree().addTile(1, origin, -from.getValue(origin), false);
+      tree.addTile(1, origin, -tree.getValue(origin), false);
       continue;
     }
-    float* values = grid->tree().probeLeaf(origin)->buffer().data();
+    Components::Leaf* leaf = tree.probeLeaf(origin);
+    if (leaf == nullptr) continue;  // of another slab
+    float* values = leaf->buffer().data();
     for (std::size_t i = 0; i < LeafLabels::size; ++i)
       if ((block.which[i >> 6] >> (i & 63U) & 1U) != 0) values[i] = -values[i];
   }
-  return grid == nullptr ? solid : make_solid(grid, solid.grid());
+  return make_solid(grid, spec);
 }
 
 }  // namespace fibrolite

@@ -96,15 +96,21 @@ int VoidMap::at(Vec3i sample) const {
   return found != impl_->number.end() && found->first == id ? found->second : outside;
 }
 
-CleanResult clean(const Solid& solid, const CleanParams& params, const Context& context) {
+CleanResult clean(Solid solid, const CleanParams& params, const Context& context) {
   openvdb::CoordBBox box;
   solid.impl().grid->tree().evalActiveVoxelBoundingBox(box);
-  if (box.empty()) return {solid, 0, 0, {}};
-  // One slab that holds all of it.
+  if (box.empty()) return {std::move(solid), 0, 0, {}};
+  // Labels take half as much as the solid: those of a slab at a time, if it may be cut.
+  constexpr int thickness = 64, few = 512;
   PieceSweep sweep(solid.grid(), {.axis = 0, .clean = params});
-  sweep.add(solid, (box.min().x() & ~7) - 8, (box.max().x() | 7) + 9, nothing(), context);
+  const int from = (box.min().x() & ~7) - 8, to = (box.max().x() | 7) + 9;
+  const bool cut = std::max(params.drop_below_vox, params.fill_below_vox) <= few;
+  for (int low = from; low < to; low += cut ? thickness : to - from) {
+    context.check();
+    sweep.add(solid, low, cut ? std::min(low + thickness, to) : to, nothing(), context);
+  }
   PieceSweep::Result found = sweep.finish();
-  CleanResult result{flipped(solid, found.flips), found.dropped, found.filled, std::move(found.left)};
+  CleanResult result{flipped(std::move(solid), found.flips), found.dropped, found.filled, std::move(found.left)};
   // A void that was filled may have been all that kept two pieces apart.
   if (result.filled > 0 && result.left.material.size() > 1) result.left = pieces(result.solid, context);
   return result;

@@ -90,35 +90,35 @@ struct SolidDistance final : Shape::Function {
 
 /// A leaf's samples with those next to its faces.
 struct Padded {
-  static constexpr int edge = 10;
-  std::array<float, edge * edge * edge> value;
-
-  /// Of sample (x, y, z), -1 to 8; the corners and edges beyond are never read.
-  [[nodiscard]] float* at(int x, int y, int z) { return value.data() + ((x + 1) * edge + y + 1) * edge + z + 1; }
+  static constexpr std::array<int, 3> stride{100, 10, 1};
+  static constexpr int first = 111;  // sample (0, 0, 0)
+  std::array<float, 1000> value;     // from (-1, -1, -1) to (8, 8, 8); the corners and edges are never read
 
   void fetch(const Leaf& leaf, openvdb::tree::ValueAccessor<const Tree>& access) {
     const float* v = leaf.buffer().data();
     for (int x = 0; x < 8; ++x)
-      for (int y = 0; y < 8; ++y) std::copy_n(v + 64 * x + 8 * y, 8, at(x, y, 0));
-    constexpr std::array<int, 3> stride{64, 8, 1};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::size_t u = (axis + 1) % 3, w = (axis + 2) % 3;
-      for (const bool upper : {false, true}) {
-        openvdb::Coord place = leaf.origin();
-        place[axis] += upper ? 8 : -8;
-        const Leaf* next = access.probeConstLeaf(place);
-        const float* from = next != nullptr ? next->buffer().data() + (upper ? 0 : 7 * stride[axis]) : nullptr;
-        const float tile = next != nullptr ? 0 : access.getValue(place);
-        for (int i = 0; i < 8; ++i) {
-          for (int j = 0; j < 8; ++j) {
-            std::array<int, 3> p{};
-            p[axis] = upper ? 8 : -1;
-            p[u] = i;
-            p[w] = j;
-            *at(p[0], p[1], p[2]) = from != nullptr ? from[i * stride[u] + j * stride[w]] : tile;
-          }
-        }
-      }
+      for (int y = 0; y < 8; ++y)
+        std::copy_n(v + 64 * x + 8 * y, 8, value.data() + first + stride[0] * x + stride[1] * y);
+    fetch_faces<0>(leaf, access);
+    fetch_faces<1>(leaf, access);
+    fetch_faces<2>(leaf, access);
+  }
+
+ private:
+  template <std::size_t axis>
+  void fetch_faces(const Leaf& leaf, openvdb::tree::ValueAccessor<const Tree>& access) {
+    constexpr std::array<int, 3> in_leaf{64, 8, 1};
+    constexpr std::size_t u = (axis + 1) % 3, w = (axis + 2) % 3;
+    for (const bool upper : {false, true}) {
+      openvdb::Coord place = leaf.origin();
+      place[axis] += upper ? 8 : -8;
+      const Leaf* next = access.probeConstLeaf(place);
+      const float* from = next != nullptr ? next->buffer().data() + (upper ? 0 : 7 * in_leaf[axis]) : nullptr;
+      const float tile = next != nullptr ? 0 : access.getValue(place);
+      float* to = value.data() + first + (upper ? 8 : -1) * stride[axis];
+      for (int i = 0; i < 8; ++i)
+        for (int j = 0; j < 8; ++j)
+          to[i * stride[u] + j * stride[w]] = from != nullptr ? from[i * in_leaf[u] + j * in_leaf[w]] : tile;
     }
   }
 };
@@ -126,18 +126,18 @@ struct Padded {
 /// Filled part of a leaf, voxels. A sample counts with clamp(1/2 - m, 0, 1), m the mean distance over its voxel: the
 /// distance at the sample plus 1/24 of the Laplacian, which takes the error of curved surfaces from second to fourth
 /// order.
-double filled(const Leaf& leaf, openvdb::tree::ValueAccessor<const Tree>& access, float inverse) {
-  Padded p;
-  p.fetch(leaf, access);
-  constexpr int dx = Padded::edge * Padded::edge, dy = Padded::edge;
+[[gnu::target_clones("avx2", "default")]] double filled(const Padded& p, float inverse) {
+  constexpr int dx = Padded::stride[0], dy = Padded::stride[1];
   std::array<float, 8> sum{};  // side by side, for the compiler
   for (int x = 0; x < 8; ++x) {
     for (int y = 0; y < 8; ++y) {
-      const float* v = p.at(x, y, 0);
-      for (std::size_t z = 0; z < 8; ++z, ++v) {
-        const float d = *v * inverse, around = v[dx] + v[-dx] + v[dy] + v[-dy] + v[1] + v[-1];
+      const float* v = p.value.data() + Padded::first + dx * x + dy * y;
+      for (int z = 0; z < 8; ++z) {
+        const float d = v[z] * inverse;
+        const float around = v[z + dx] + v[z - dx] + v[z + dy] + v[z - dy] + v[z + 1] + v[z - 1];
         const float mean = d + (around * inverse - 6 * d) * (1.0F / 24.0F);
-        sum[z] += std::clamp(0.5F - (std::abs(d) < 1.5F ? mean : d), 0.0F, 1.0F);
+        const float part = 0.5F - (std::abs(d) < 1.5F ? mean : d), most = part < 1.0F ? part : 1.0F;
+        sum[static_cast<std::size_t>(z)] += most > 0.0F ? most : 0.0F;
       }
     }
   }
@@ -155,8 +155,11 @@ double filled_voxels(const Tree& tree, double voxel_mm, const SampleRange* range
   const auto inverse = static_cast<float>(1.0 / voxel_mm);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size(), 64), [&](const auto& some) {
     openvdb::tree::ValueAccessor<const Tree> access(tree);
+    Padded padded;
     for (std::size_t i = some.begin(); i < some.end(); ++i) {
-      if (range == nullptr || holds(*range, leaves.leaf(i).origin())) part[i] = filled(leaves.leaf(i), access, inverse);
+      if (range != nullptr && !holds(*range, leaves.leaf(i).origin())) continue;
+      padded.fetch(leaves.leaf(i), access);
+      part[i] = filled(padded, inverse);
     }
   });
   double voxels = 0;
@@ -197,6 +200,12 @@ openvdb::FloatGrid::Ptr make_grid(Grid spec) {
 
 Solid make_solid(openvdb::FloatGrid::ConstPtr grid, Grid spec) {
   return Solid(std::make_shared<const Solid::Impl>(Solid::Impl{std::move(grid), spec}));
+}
+
+openvdb::FloatGrid::Ptr editable(Solid&& solid) {
+  const std::shared_ptr<const Solid::Impl> impl = std::exchange(solid, {}).share();
+  if (impl.use_count() > 1 || impl->grid.use_count() > 1) return impl->grid->deepCopy();
+  return std::const_pointer_cast<openvdb::FloatGrid>(impl->grid);
 }
 
 Solid::Solid() : Solid(make_solid(make_grid({}), {})) {}

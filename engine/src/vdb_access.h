@@ -23,5 +23,7 @@ void initialize_openvdb();
 /// An empty level-set grid on the lattice of `spec`.
 [[nodiscard]] openvdb::FloatGrid::Ptr make_grid(Grid spec);
 [[nodiscard]] Solid make_solid(openvdb::FloatGrid::ConstPtr grid, Grid spec);
+/// The solid's grid to change: its own if nothing else holds it, else a copy.
+[[nodiscard]] openvdb::FloatGrid::Ptr editable(Solid&& solid);
 
 }  // namespace fibrolite

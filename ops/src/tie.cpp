@@ -9,11 +9,10 @@
 
 namespace fibrolite {
 
-Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const TieParams& params,
-         const Context& context) {
+Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams& params, const Context& context) {
   constexpr int rounds = 3;  // a strut may end on another loose piece, which the next round ties
   Tied result;
-  CleanResult cleaned = clean(solid, params.clean, context);
+  CleanResult cleaned = clean(std::move(solid), params.clean, context);
   const auto add = [&](const Gap& gap) { result.struts.push_back(strut(gap, params.strut_mm)); };
   const auto make = [&] {
     const Shape struts = subtract(intersect({distance_to(body), capsules(result.struts)}), params.keep_out);

@@ -127,6 +127,19 @@ TEST(MeshCheck, counts_known_faults) {
   EXPECT_TRUE(check(collapsed).closed());
 }
 
+TEST(MeshCheck, four_triangles_on_an_edge_in_any_order) {
+  Mesh mesh = joined(cube(1), cube(1, {1, 1, 0}));
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    Random random(seed, "order");
+    for (std::size_t i = mesh.triangles.size(); i > 1; --i)
+      std::swap(mesh.triangles[i - 1], mesh.triangles[random.below(i)]);
+    const MeshCheck found = check(mesh);
+    ASSERT_EQ(found.nonmanifold_edges, 1) << seed;
+    ASSERT_EQ(found.nonmanifold_vertices, 0) << seed;
+    ASSERT_EQ(found.shells, 1) << seed;
+  }
+}
+
 TEST(MeshCheck, agrees_with_an_independent_count_on_random_soups) {
   Random random(1, "mesh_test");
   for (int round = 0; round < 50; ++round) {

@@ -24,7 +24,7 @@ struct Flips {
 };
 /// The solid with those of the samples that it holds turned over. Cost: a copy of the solid, if there is any flip in
 /// it.
-[[nodiscard]] Solid flipped(const Solid& solid, const Flips& flips);
+[[nodiscard]] Solid flipped(Solid solid, const Flips& flips);
 
 class PieceSweep {
  public:

@@ -51,7 +51,7 @@ struct CleanResult {
   Pieces left;
 };
 /// Remove loose specks and fill micro-voids; the largest piece always stays.
-[[nodiscard]] CleanResult clean(const Solid& solid, const CleanParams& params = {}, const Context& context = {});
+[[nodiscard]] CleanResult clean(Solid solid, const CleanParams& params = {}, const Context& context = {});
 
 /// A way from a loose piece to the nearest other material.
 struct Gap {

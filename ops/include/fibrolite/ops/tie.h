@@ -34,7 +34,7 @@ struct Tied {
 /// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. Loose pieces
 /// first, then thin necks, a few rounds each. Cost: as pieces() and unreached(), and a realize per round that finds
 /// something.
-[[nodiscard]] Tied tie(const Solid& solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
+[[nodiscard]] Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
                        const Context& context = {});
 /// What crosses a gap: grown into both its ends by half its diameter.
 [[nodiscard]] Capsule strut(const Gap& gap, double strut_mm);
