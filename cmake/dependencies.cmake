@@ -30,7 +30,8 @@ macro(fibrolite_find_libraries)
   fibrolite_import(lib3mf::lib3mf Model/COM/NMR_DLLInterfaces.h 3MF lib3mf)
   fibrolite_import(GMP::mpfr mpfr.h mpfr) # CGAL itself is headers only, found where the compiler looks
   fibrolite_import(GMP::gmp gmp.h gmp)
-  foreach(module core imgproc imgcodecs) # OpenCV's config file comes with all of OpenCV only
+  find_package(PNG REQUIRED)
+  foreach(module core imgproc) # OpenCV's config file comes with all of OpenCV only
     fibrolite_import(OpenCV::${module} opencv2/${module}.hpp opencv_${module} opencv4)
   endforeach()
   fibrolite_import(SuiteSparse::cholmod cholmod.h cholmod suitesparse)
@@ -43,6 +44,7 @@ macro(fibrolite_find_build_tools)
   find_package(nlohmann_json 3.11 REQUIRED)
   find_package(CLI11 REQUIRED)
   fibrolite_import(TetGen::tet tetgen.h tet)
+  fibrolite_import(OpenCV::imgcodecs opencv2/imgcodecs.hpp opencv_imgcodecs opencv4)
   if(FIBROLITE_TESTS)
     find_package(GTest REQUIRED)
   endif()

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The installed tree: bin/fibrolite, libexec/fibrolite/fibrolite-tetgen, share/fibrolite/assets, the two libraries with their headers,
+# The installed tree: bin/fibrolite, libexec/fibrolite/ with the programs that run beside it, share/fibrolite/assets, the two libraries with their headers,
 # lib/cmake/fibrolite for find_package(fibrolite), and lib/pkgconfig/fibrolite.pc. Targets: fibrolite::engine, fibrolite::ops, and fibrolite::fibrolite for both.
 include(CMakePackageConfigHelpers)
 
 set(fibrolite_config_dir ${CMAKE_INSTALL_LIBDIR}/cmake/fibrolite)
 
 install(TARGETS fibrolite RUNTIME)
-install(TARGETS fibrolite-tetgen RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/fibrolite)
+install(TARGETS fibrolite-decode fibrolite-tetgen RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/fibrolite)
 install(DIRECTORY assets/models assets/recipes assets/textures DESTINATION ${CMAKE_INSTALL_DATADIR}/fibrolite/assets)
 install(DIRECTORY LICENSES/ DESTINATION ${CMAKE_INSTALL_DATADIR}/licenses/fibrolite)
 
@@ -24,7 +24,7 @@ set(fibrolite_pc_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH fibrolite_pc_to_prefix /${fibrolite_pc_dir} /)
 string(REGEX REPLACE "/$" "" fibrolite_pc_to_prefix ${fibrolite_pc_to_prefix})
 set(fibrolite_pc_libs "")
-foreach(target OpenVDB::openvdb OpenVDB::half lib3mf::lib3mf GMP::mpfr GMP::gmp OpenCV::imgcodecs OpenCV::imgproc OpenCV::core
+foreach(target OpenVDB::openvdb OpenVDB::half lib3mf::lib3mf GMP::mpfr GMP::gmp PNG::PNG OpenCV::imgproc OpenCV::core
                SuiteSparse::cholmod OpenBLAS::openblas)
   get_target_property(library ${target} IMPORTED_LOCATION)
   cmake_path(GET library PARENT_PATH folder)

@@ -55,6 +55,7 @@ Run measure(const Case& c, const Options& options) {
                                    "--overwrite",
                                    "--quiet"};
   for (const std::string& key : c.set) command.insert(command.end(), {"--set", key});
+  if (!c.max_memory.empty()) command.insert(command.end(), {"--max-memory", c.max_memory});
   if (options.threads > 0) command.insert(command.end(), {"--threads", std::to_string(options.threads)});
   Run run;
   run.program = fibrolite::bench::run(command, log);

@@ -76,9 +76,20 @@ std::vector<Case> suite(const SuiteParams& params) {
               .preset = "peer-tcs",
               .repeats = 3,
               .goals = {}};
-    if (voxel_mm < 0.4) peer.goals.floor_ratio = 2.0;
-    if (voxel_mm < 0.2) peer.goals.peak_rss_mb = 900;
+    // Four times the samples and triangles: surface-bound, not volume-bound.
+    if (voxel_mm < 0.4) peer.goals = {.floor_ratio = 0.6, .cpu_times = 4.5};
+    if (voxel_mm < 0.4) peer.beside = "peer-tcs " + label(2 * voxel_mm);
+    if (voxel_mm < 0.2) peer.goals.peak_rss_mb = 550;
     cases.push_back(peer);
+  }
+  if (!params.quick) {
+    Case slabs = cases.back();
+    slabs.name += " slabs";
+    slabs.repeats = 1;
+    slabs.max_memory = "300M";
+    slabs.beside = cases.back().name;
+    slabs.goals = {.peak_rss_mb = 300 * 1.048576, .cpu_times = 1.8};
+    cases.push_back(slabs);
   }
   if (params.quick) {
     cases.push_back({.name = "hybrid 100", .model = main_model, .voxel_mm = 0.25, .goals = {}});

@@ -30,6 +30,7 @@ struct Case {
   Goals goals;
   std::vector<std::string> set{};  ///< Recipe keys, as `--set` takes them.
   std::string beside{};            ///< An earlier case to compare with.
+  std::string max_memory{};        ///< As `--max-memory` takes it.
 };
 struct SuiteParams {
   std::filesystem::path assets;                 ///< Bundled models, .ply.

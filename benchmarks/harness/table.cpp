@@ -107,7 +107,7 @@ nlohmann::json to_json(const Case& c, const Run& run) {
                       {"size_mm", c.size_mm}, {"voxel_mm", c.voxel_mm},
                       {"infill", c.infill},   {"preset", c.preset},
                       {"repeats", c.repeats}, {"set", c.set},
-                      {"beside", c.beside}};
+                      {"beside", c.beside},   {"max_memory", c.max_memory}};
   if (!run.failure.empty()) {
     json["failure"] = run.failure;
     return json;

@@ -130,15 +130,16 @@ void KeepVolume::choose_moves(std::size_t n) {
   constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
   const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
   Work& work = window_[n];
-  const double most = 0.35 * voxel_mm_;
+  const double unit = static_cast<double>(move_unit(voxel_mm_)), most = 32767 * unit;
   work.layer.moves.resize(work.mine.size());
   for (std::size_t i = 0; i < work.mine.size(); ++i) {
     const Umbrella& u = work.mine[i];
     const Vec3d normal = normalized(Vec3d{u.nx, u.ny, u.nz});
     const double along = dot(Vec3d{u.x, u.y, u.z}, normal);
     const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.edges, bent, flat);
-    const Vec3f move = to_float(std::clamp((edge - 1) * along, -most, most) * normal);
-    work.layer.moves[i] = Vec3s(move.x, move.y, move.z);
+    const Vec3d move = std::clamp((edge - 1) * along, -most, most) / unit * normal;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      work.layer.moves[i][axis] = static_cast<std::int16_t>(std::lround(move[static_cast<int>(axis)]));
   }
   work.mine = {};
 }
@@ -147,13 +148,16 @@ void KeepVolume::choose_moves(std::size_t n) {
 std::array<double, 4> KeepVolume::split(std::size_t n) {
   MovableLayer& layer = window_[n].layer;
   const MovableLayer* below = n > 0 ? &window_[n - 1].layer : nullptr;
+  const auto unit = static_cast<double>(move_unit(voxel_mm_));
   std::array<double, 4> sum{};
   for (Quad& q : layer.quads) {
     std::array<Vec3d, 4> p, m{};
     for (std::size_t k = 0; k < 4; ++k) {
       const MovableLayer& of = q[k] >= layer.first ? layer : *below;
       p[k] = to_vec(of.points[q[k] - of.first]);
-      if (moving_) m[k] = to_vec(of.moves[q[k] - of.first]);
+      if (!moving_) continue;
+      const MovableLayer::Move& move = of.moves[q[k] - of.first];
+      m[k] = unit * Vec3d{1.0 * move[0], 1.0 * move[1], 1.0 * move[2]};
     }
     const Vec3d first = p[2] + m[2] - p[0] - m[0], second = p[3] + m[3] - p[1] - m[1];
     std::size_t a = 0;

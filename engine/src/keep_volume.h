@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <vector>
@@ -14,8 +15,11 @@ namespace fibrolite {
 
 /// Quads are turned so that each is split from its first corner to its third.
 struct MovableLayer : QuadLayer {
-  std::vector<openvdb::Vec3s> moves;  ///< mm, per point; none if nothing moves.
+  using Move = std::array<std::int16_t, 3>;
+  std::vector<Move> moves;  ///< Per point, times move_unit(); none if nothing moves.
 };
+/// A 32767th of the longest move, 0.35 voxels: mm.
+[[nodiscard]] constexpr float move_unit(double voxel_mm) { return static_cast<float>(0.35 * voxel_mm / 32767); }
 
 /// A mesh with its vertices on (or, as those of a dual surface, averaged below) a convex surface lies inside it and
 /// loses volume. To second order the loss is made good by moving each vertex along its normal by the normal part of its

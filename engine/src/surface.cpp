@@ -106,7 +106,8 @@ class LayerStore {
 class Finisher {
  public:
   using Use = std::function<void(const MeshLayer&)>;
-  Finisher(float step, double voxel_mm, const Use& use) : step_(step), voxel_mm_(voxel_mm), use_(use) {}
+  Finisher(double step, double voxel_mm, const Use& use)
+      : step_(static_cast<float>(step) * move_unit(voxel_mm)), voxel_mm_(voxel_mm), use_(use) {}
 
   void add(const MovableLayer& layer) {
     const std::size_t from = points_.size();
@@ -114,7 +115,10 @@ class Finisher {
     points_.resize(from + layer.points.size());
     each_chunk(layer.points.size(), [&](std::size_t i) {
       openvdb::Vec3s p = layer.points[i];
-      if (!layer.moves.empty()) p += step_ * layer.moves[i];
+      if (!layer.moves.empty()) {
+        const MovableLayer::Move& move = layer.moves[i];
+        p += step_ * openvdb::Vec3s(move[0], move[1], move[2]);
+      }
       points_[from + i] = {p.x(), p.y(), p.z()};
     });
     shake_degenerate(layer.quads);
@@ -174,7 +178,7 @@ class Finisher {
     first_ += before_;
   }
 
-  float step_;
+  float step_;  // mm for each unit of a move
   double voxel_mm_;
   const Use& use_;
   // Of the layer below the one that waits, that one, and for a moment the next.
@@ -233,7 +237,7 @@ std::size_t SurfaceLayers::triangles() const { return 2 * impl_->store.quads(); 
 
 void SurfaceLayers::each(const std::function<void(const MeshLayer&)>& use, const Context& context) const {
   if (!impl_->finished) throw Error(Code::Internal, "the surface is not finished");
-  Finisher finisher(static_cast<float>(impl_->step), impl_->grid.voxel_mm, use);
+  Finisher finisher(impl_->step, impl_->grid.voxel_mm, use);
   MovableLayer room;
   const std::size_t count = impl_->store.size();
   for (std::size_t n = 0; n < count; ++n) {

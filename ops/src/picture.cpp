@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <opencv2/imgcodecs.hpp>
 #include <span>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "picture_raster.h"
 #include "picture_shade.h"
 #include "picture_view.h"
+#include "png_file.h"
 
 namespace fibrolite {
 namespace {
@@ -56,24 +56,10 @@ RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& colo
 }
 
 void write_png(const std::filesystem::path& path, const RgbImage& image) {
-  OutputFile file(path);
-  std::vector<unsigned char> bytes;
-  try {
-    cv::Mat bgr(image.height, image.width, CV_8UC3);
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        const Rgb c = image(x, y);
-        bgr.at<cv::Vec3b>(y, x) = {c.b, c.g, c.r};
-      }
-    }
-    if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 7})) {
-      throw Error(Code::Io, "the picture cannot be encoded", path.string());
-    }
-  } catch (const cv::Exception& error) {
-    throw Error(Code::Io, "the picture cannot be encoded: " + error.err, path.string());
-  }
-  file.write(std::as_bytes(std::span(bytes)));
-  file.commit();
+  static_assert(sizeof(Rgb) == 3);
+  const auto bytes = std::as_bytes(std::span(image.pixels));
+  write_png_file(path, image.width, image.height, 3,
+                 {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 
 // From the palette of Okabe and Ito (2008), made for colour-blind readers: cool colours for columns, warm and earthen

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fibrolite/ops/tetrahedralize.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cstdlib>
 #include <cstring>
 #include <optional>
 #include <span>
@@ -18,6 +15,7 @@
 #include "child_process.h"
 #include "fibrolite/disjoint_sets.h"
 #include "fibrolite/error.h"
+#include "helper_program.h"
 
 namespace fibrolite {
 namespace {
@@ -254,24 +252,6 @@ TetMesh tetrahedralize(const Mesh& closed_surface, const TetrahedralizeParams& p
   return mesh;
 }
 
-std::filesystem::path tetgen_program() {
-  namespace fs = std::filesystem;
-  constexpr const char* name = "fibrolite-tetgen";
-  std::vector<fs::path> places;
-  if (const char* named = std::getenv("FIBROLITE_TETGEN")) places.emplace_back(named);
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  if (!program.empty()) {
-    places.push_back(program.parent_path() / name);
-    places.push_back(program.parent_path().parent_path() / "libexec" / "fibrolite" / name);
-  }
-  places.push_back(fs::path(FIBROLITE_BUILD_BIN) / name);
-  places.push_back(fs::path(FIBROLITE_INSTALL_LIBEXEC) / name);
-  for (const fs::path& place : places) {
-    if (access(place.c_str(), X_OK) == 0 && fs::is_regular_file(place, ignored)) return place;
-  }
-  throw Error(Code::SolverFailed, "the program fibrolite-tetgen is nowhere to be found", {},
-              "reinstall, or name it in FIBROLITE_TETGEN");
-}
+std::filesystem::path tetgen_program() { return helper_program("fibrolite-tetgen", "FIBROLITE_TETGEN"); }
 
 }  // namespace fibrolite

@@ -2,20 +2,24 @@
 #include "fibrolite/ops/infill/micrograph.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <iterator>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "child_process.h"
 #include "fibrolite/error.h"
-#include "fibrolite/file.h"
+#include "helper_program.h"
 #include "infill/cells.h"
 #include "infill/census.h"
+#include "png_file.h"
 
 namespace fibrolite {
 namespace {
@@ -240,34 +244,45 @@ FibreMap find_fibres(const GrayImage& micrograph) try {
   throw Error(Code::Internal, "image processing failed: " + e.err, "find_fibres");
 }
 
-GrayImage read_gray(const std::filesystem::path& path) {
-  const auto refuse = [&](const std::string& why) {
-    throw Error(Code::BadInput, "cannot read image" + why, path.string(), "give a .png, .jpg, .tif or .bmp image");
-  };
-  // Not cv::imread: it prints when a file is missing.
-  std::ifstream file(path, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (bytes.empty()) refuse("");
-  cv::Mat image;
-  try {
-    image = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception& e) {
-    refuse(": " + e.err);
-  }
-  if (image.empty()) refuse("");
-  GrayImage gray(image.cols, image.rows);
-  for (int y = 0; y < image.rows; ++y) std::copy_n(image.ptr<std::uint8_t>(y), image.cols, &gray(0, y));
+namespace {
+
+[[noreturn]] void refuse_image(const std::filesystem::path& path) {
+  throw Error(Code::BadInput, "cannot read image", path.string(), "give a .png, .jpg, .tif or .bmp image");
+}
+
+/// Any image, read by a program of its own (ops/decode).
+GrayImage decoded_gray(std::span<const std::byte> file, const std::filesystem::path& path) {
+  constexpr ChildLimits limits{.wall_s = 120, .output_bytes = std::size_t{1} << 30U};
+  const ChildResult result =
+      run_child(helper_program("fibrolite-decode", "FIBROLITE_DECODE"), {}, file, limits, Context());
+  constexpr std::string_view magic = "FBLTGRY1";
+  std::array<std::uint32_t, 2> size{};
+  const std::span<const std::byte> out = result.output;
+  if (!result.failure.empty() || out.size() < magic.size() + sizeof size ||
+      std::memcmp(out.data(), magic.data(), magic.size()) != 0)
+    refuse_image(path);
+  std::memcpy(size.data(), out.data() + magic.size(), sizeof size);
+  const std::span<const std::byte> pixels = out.subspan(magic.size() + sizeof size);
+  if (size[0] == 0 || size[1] == 0 || pixels.size() / size[0] != size[1] || pixels.size() % size[0] != 0)
+    refuse_image(path);
+  GrayImage gray(static_cast<int>(size[0]), static_cast<int>(size[1]));
+  std::memcpy(gray.pixels.data(), pixels.data(), pixels.size());
   return gray;
 }
 
+}  // namespace
+
+GrayImage read_gray(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::vector<char> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (bytes.empty()) refuse_image(path);
+  const auto input = std::as_bytes(std::span(bytes));
+  if (auto gray = plain_gray_png(input)) return *std::move(gray);
+  return decoded_gray(input, path);
+}
+
 void write_gray(const std::filesystem::path& path, const GrayImage& image) {
-  cv::Mat gray(image.height, image.width, CV_8U);
-  std::copy(image.pixels.begin(), image.pixels.end(), gray.begin<std::uint8_t>());
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", gray, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-  OutputFile file(path);
-  file.write(std::as_bytes(std::span<const std::uint8_t>(bytes)));
-  file.commit();
+  write_png_file(path, image.width, image.height, 1, image.pixels);
 }
 
 std::filesystem::path bundled_micrograph() {
