@@ -72,16 +72,16 @@ Density density(double h, const Recipe& recipe, InfillKind infill) {
 }
 
 constexpr double bytes_a_sample = 4.2;
-/// While it is made, the body takes more than its samples; the solid is joined by labels of its pieces, and copied if
-/// some samples change.
-constexpr double body_times = 1.4, solid_times = 2.8;
+/// While it is made, the body takes more than its samples; the solid is joined by labels of its pieces, some slabs'
+/// worth at a time.
+constexpr double body_times = 1.1, solid_times = 1.75;
 
 /// All fits lie above what was measured by this at least.
-constexpr double safety = 1.12;
+constexpr double safety = 1.2;
 
-double fixed_bytes(const Mesh& model) { return 100e6 + 400.0 * static_cast<double>(model.triangles.size()); }
-/// Of the proxy's finite elements. What they leave behind is used again for voxels, hardly for a mesh.
-double deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 150e6 : 0; }
+double fixed_bytes(const Mesh& model) { return 50e6 + 300.0 * static_cast<double>(model.triangles.size()); }
+/// Of the proxy's finite elements, before there is a voxel.
+double deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 240e6 : 0; }
 
 /// Of the layers of a surface that are worked on at once: eight of some 100 bytes a vertex.
 double layers_bytes(double triangles_a_layer) { return 8 * 50 * triangles_a_layer; }
@@ -134,9 +134,9 @@ Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, Inf
   Prediction result;
   result.active_voxels = d.active_a_face_mm2 * faces_mm2;
   result.triangles = d.triangles_a_face_mm2 * faces_mm2;
-  // The body is gone when the surface is made, which takes thirty bytes a triangle.
-  const double voxels = body_times * body + solid_times * solid, mesh = solid + 30 * result.triangles;
-  result.memory_bytes = fixed_bytes(model) + std::max(safety * voxels, deciding_bytes(infill) + safety * mesh);
+  // The body is gone when the surface is made, which takes twenty bytes a triangle.
+  const double voxels = body_times * body + solid_times * solid, mesh = solid + 20 * result.triangles;
+  result.memory_bytes = fixed_bytes(model) + std::max({safety * voxels, safety * mesh, deciding_bytes(infill)});
   return result;
 }
 
@@ -167,7 +167,7 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
     return sum[static_cast<std::size_t>(std::min(to + margin, count))] -
            sum[static_cast<std::size_t>(std::max(from - margin, 0))];
   };
-  plan.memory_bytes = fixed_bytes(model) + 1.6 * deciding_bytes(infill);  // while it decides
+  plan.memory_bytes = fixed_bytes(model) + deciding_bytes(infill);
   const double fixed = fixed_bytes(model) + (needs.surface ? layers_bytes(largest_layer) : 0);
   plan.borders.push_back(8 * p.first);
   for (int from = 0; from < count;) {

@@ -137,9 +137,9 @@ TEST(Generate, LessMemoryGivesTheSameFilesSlabBySlab) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   };
-  EXPECT_THAT(generated(slabs, {"--max-memory", "250M", "--dry-run"}).out, HasSubstr("slabs"));
+  EXPECT_THAT(generated(slabs, {"--max-memory", "180M", "--dry-run"}).out, HasSubstr("slabs"));
   generated(whole, {});
-  generated(slabs, {"--max-memory", "250M"});
+  generated(slabs, {"--max-memory", "180M"});
   for (const char* ending : {"stl", "ply", "obj", "off", "3mf"}) {
     const std::string name = std::string("part.") + ending;
     EXPECT_TRUE(content(whole / name) == content(slabs / name)) << ending;
@@ -148,7 +148,7 @@ TEST(Generate, LessMemoryGivesTheSameFilesSlabBySlab) {
   for (const char* block : {"model", "parts", "interfaces", "solid", "print", "mesh", "warnings"})
     EXPECT_EQ(a[block], b[block]) << block;
   EXPECT_EQ(b["mesh"]["boundary_edges"], 0);
-  for (const json& stage : b["stages"]) EXPECT_LE(stage["peak_rss_mb"], 250 * 1.048576);
+  for (const json& stage : b["stages"]) EXPECT_LE(stage["peak_rss_mb"], 180 * 1.048576);
   EXPECT_EQ(names_in(slabs.path()).size(), 6U);  // nothing stays behind
 }
 
@@ -156,7 +156,7 @@ TEST(Generate, WhatNeedsTheWholeSolidIsRefusedIfItDoesNotFit) {
   const TempDir folder;
   const auto refused = [&](const std::string& output, const std::vector<std::string>& more) {
     std::vector<std::string> arguments{"generate", asset("molar").string(), "--infill", "tcs", "--voxel",
-                                       "0.2",      "--max-memory",          "250M",     "-o",  folder / output};
+                                       "0.2",      "--max-memory",          "180M",     "-o",  folder / output};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return refused_run(arguments, 5, folder.path());
   };

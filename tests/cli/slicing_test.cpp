@@ -111,14 +111,14 @@ TEST(Slicing, LessMemoryGivesTheSameBytesSlabBySlab) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   };
-  EXPECT_THAT(sliced(slabs, {"--max-memory", "250M", "--dry-run"}).out, HasSubstr("slabs"));
+  EXPECT_THAT(sliced(slabs, {"--max-memory", "180M", "--dry-run"}).out, HasSubstr("slabs"));
   sliced(whole, {});
-  sliced(slabs, {"--max-memory", "250M"});
+  sliced(slabs, {"--max-memory", "180M"});
   EXPECT_TRUE(content(whole / "molar.zip") == content(slabs / "molar.zip"));
   json a = report_in(whole / "molar.report.json"), b = report_in(slabs / "molar.report.json");
   for (const char* block : {"model", "parts", "interfaces", "solid", "print", "slices"})
     EXPECT_EQ(a[block], b[block]) << block;
-  for (const json& stage : b["stages"]) EXPECT_LE(stage["peak_rss_mb"], 250 * 1.048576);
+  for (const json& stage : b["stages"]) EXPECT_LE(stage["peak_rss_mb"], 180 * 1.048576);
 }
 
 TEST(Slicing, ADryRunOnlySays) {
@@ -177,7 +177,7 @@ TEST_F(SlicingRefused, MoreThanTheFormatHolds) {
 }
 TEST_F(SlicingRefused, DrainHolesOfASolidThatDoesNotFit) {
   const std::string said =
-      refused({"--size", "400", "--layer", "5", "--pixel", "1", "--max-memory", "250M", "--set", "print.drain_mm=2"},
+      refused({"--size", "400", "--layer", "5", "--pixel", "1", "--max-memory", "180M", "--set", "print.drain_mm=2"},
               OutOfMemory);
   EXPECT_THAT(said, HasSubstr("print.drain_mm needs the whole solid"));
 }

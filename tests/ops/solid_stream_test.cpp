@@ -162,7 +162,7 @@ TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {
     EXPECT_TRUE(std::is_sorted(plan.borders.begin(), plan.borders.end()));
     for (const int border : plan.borders) EXPECT_EQ(border % 8, 0);
   }
-  EXPECT_GT(plan_slabs(mesh, h, recipe, InfillKind::Tcs, {2, 1.0}, 130e6).memory_bytes, 130e6);
+  EXPECT_GT(plan_slabs(mesh, h, recipe, InfillKind::Tcs, {2, 1.0}, 80e6).memory_bytes, 80e6);
 }
 
 }  // namespace
