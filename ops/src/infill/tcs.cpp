@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -253,18 +254,51 @@ Fill filled(const TcsParams& p, Shape shape, const std::optional<Shape>& thickne
   return fill;
 }
 
+/// How much thicker than given the thickest members of a cell can be.
+double most_scale(const TcsParams& p, double thickest_mm) {
+  return p.cell_mm.least() / cell_per_member(p.form) / thickest_mm;
+}
+
+double membrane_of(const TcsParams& p) { return p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0; }
+
+/// Share of material against how many times as thick members are, linear between values.
+class DensityCurve {
+ public:
+  DensityCurve(const TcsParams& p, double least, double most) : least_(least), step_((most - least) / steps) {
+    const double area = membrane_of(p);
+    for (std::size_t i = 0; i < value_.size(); ++i)
+      value_[i] = measured(scaled(p, least + step_ * static_cast<double>(i)), area);
+  }
+  /// Over all places, each with members `scale` times its factor times as thick.
+  [[nodiscard]] double mean(std::span<const float> factors, double scale) const {
+    double sum = 0;
+    for (const float f : factors) {
+      const double place =
+          step_ > 0 ? std::clamp((scale * static_cast<double>(f) - least_) / step_, 0.0, 1.0 * steps) : 0;
+      const auto below = std::min(static_cast<std::size_t>(place), value_.size() - 2);
+      sum += std::lerp(value_[below], value_[below + 1], place - static_cast<double>(below));
+    }
+    return sum / static_cast<double>(factors.size());
+  }
+
+ private:
+  static constexpr int steps = 32;
+  double least_, step_;
+  std::array<double, steps + 1> value_{};
+};
+
 }  // namespace
 
 MemberRange members(const TcsParams& params) {
   const double given = member_mm(sized(params));
-  if (params.grade == TcsGrade::None) return {given, given};
+  if (params.grade == TcsGrade::None || params.density) return {given, given};
   return {params.grade_least * given, params.grade_most * given};
 }
 
 double density(const TcsParams& params) {
   const TcsParams p = sized(params);
   check(p);
-  return measured(p, p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0);
+  return measured(p, membrane_of(p));
 }
 
 TcsParams sized(const TcsParams& params) {
@@ -272,11 +306,10 @@ TcsParams sized(const TcsParams& params) {
   TcsParams p = params;
   p.density.reset();
   check_cell(p);
-  const double wanted = *params.density;
-  const double area = p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0;
+  const double wanted = *params.density, area = membrane_of(p);
   const auto of = [&](double scale) { return measured(scaled(p, scale), area); };
   // The thickest members a cell may have, and the thinnest worth a name; density rises with thickness.
-  double high = p.cell_mm.least() / cell_per_member(p.form) / members(p).most_mm, low = 0.04 * high;
+  double high = most_scale(p, member_mm(p)), low = 0.04 * high;
   const double most = of(high), least = of(low);
   if (!(wanted >= least && wanted <= most))
     refuse(std::string("no ")
@@ -293,6 +326,24 @@ TcsParams sized(const TcsParams& params) {
     (of(middle) < wanted ? low : high) = middle;
   }
   return scaled(p, 0.5 * (low + high));
+}
+
+GradedSizes sized(const TcsParams& params, std::span<const float> factors, double least_mm) {
+  const TcsParams p = sized(params);
+  const MemberRange given = members(p);
+  double high = most_scale(p, given.most_mm), low = std::max(least_mm / given.least_mm, 0.04 * high);
+  if (!(low <= high))
+    refuse("no cell of this size has room for members from " + number_text(least_mm) + " mm up to " +
+               number_text(p.grade_most / p.grade_least) + " times that",
+           "tcs.grade_most", "use a larger tcs.cell_mm, or a grade_most nearer to grade_least");
+  const DensityCurve curve(p, low * p.grade_least, high * p.grade_most);
+  const double wanted = params.density.value_or(curve.mean(factors, 1));
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (curve.mean(factors, middle) < wanted ? low : high) = middle;
+  }
+  const double scale = 0.5 * (low + high);
+  return {scaled(p, scale), curve.mean(factors, scale)};
 }
 
 Shape crystal(const TcsParams& params) {
