@@ -30,33 +30,20 @@ struct Network final : Shape::Function {
 
 using Values = std::array<float, PointBlock::capacity>;
 
-/// Distances to lines, points or a surface, less a radius that is `thickness` times a given one.
-struct Graded final : Shape::Function {
-  struct Member {
-    Shape middle;
-    double radius_mm;
-  };
-  Graded(std::vector<Member> list, Shape factors) : members(std::move(list)), thickness(std::move(factors)) {}
+/// Distance to a surface, less half of a wall that is `thickness` times as thick as a given one.
+struct GradedSheet final : Shape::Function {
+  GradedSheet(Shape surface, double wall_mm, Shape factors)
+      : middle(std::move(surface)), half_mm(0.5 * wall_mm), thickness(std::move(factors)) {}
   void evaluate(const PointBlock& block, float* out) const override {
-    Values factor, value;
+    Values factor;
     thickness.evaluate(block, factor.data());
-    std::fill_n(out, block.count, far_mm);
-    for (const Member& m : members) {
-      m.middle.evaluate(block, value.data());
-      const auto radius = static_cast<float>(m.radius_mm);
-      for (int i = 0; i < block.count; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        out[i] = std::min(out[i], value[k] - radius * factor[k]);
-      }
-    }
+    middle.evaluate(block, out);
+    const auto half = static_cast<float>(half_mm);
+    for (int i = 0; i < block.count; ++i) out[i] -= half * factor[static_cast<std::size_t>(i)];
   }
-  [[nodiscard]] double lipschitz() const override {
-    double steepest = 0;
-    for (const Member& m : members)
-      steepest = std::max(steepest, m.middle.lipschitz() + m.radius_mm * thickness.lipschitz());
-    return steepest;
-  }
-  std::vector<Member> members;
+  [[nodiscard]] double lipschitz() const override { return middle.lipschitz() + half_mm * thickness.lipschitz(); }
+  Shape middle;
+  double half_mm;
   Shape thickness;
 };
 
@@ -361,26 +348,24 @@ Shape crystal(const TcsParams& params, const Shape& thickness) {
     change(other);
     return is_turned(p) ? placed(in_lattice(other, {}), lattice(p)) : in_lattice(other, p.shift_mm);
   };
-  constexpr double none = -2 * far_mm;
-  std::vector<Graded::Member> list;
   switch (p.form) {
-    case TcsForm::Sticks:
-      list.push_back({of([](TcsParams& q) { q.stick_mm = 0, q.ball_mm = none; }), 0.5 * p.stick_mm});
-      list.push_back({of([](TcsParams& q) { q.stick_mm = none, q.ball_mm = 0; }), 0.5 * p.ball_mm});
-      break;
-    case TcsForm::Sheet:
-      list.push_back({of([](TcsParams& q) { q.wall_mm = 0; }), 0.5 * p.wall_mm});
-      break;
-    case TcsForm::Network: {
-      constexpr int sizes = 5;
-      std::vector<Shape> network;
-      for (int i = 0; i < sizes; ++i)
-        network.push_back(
-            of([&](TcsParams& q) { q.stick_mm *= p.grade_least + (p.grade_most - p.grade_least) * i / (sizes - 1); }));
-      return Shape(std::make_shared<const Between>(std::move(network), thickness, p));
+    case TcsForm::Sticks: {
+      const Radii radii{0.5 * p.stick_mm, 0.5 * p.ball_mm};
+      if (!is_turned(p)) return sticks_and_balls(cell_of(p), radii, p.shift_mm, thickness);
+      const Frame frame = lattice(p);
+      return placed(sticks_and_balls(cell_of(p), radii, {}, placed(thickness, inverse(frame))), frame);
     }
+    case TcsForm::Sheet:
+      return Shape(std::make_shared<const GradedSheet>(of([](TcsParams& q) { q.wall_mm = 0; }), p.wall_mm, thickness));
+    case TcsForm::Network:
+      break;
   }
-  return Shape(std::make_shared<const Graded>(std::move(list), thickness));
+  constexpr int sizes = 5;
+  std::vector<Shape> network;
+  for (int i = 0; i < sizes; ++i)
+    network.push_back(
+        of([&](TcsParams& q) { q.stick_mm *= p.grade_least + (p.grade_most - p.grade_least) * i / (sizes - 1); }));
+  return Shape(std::make_shared<const Between>(std::move(network), thickness, p));
 }
 
 Shape thicker_at_surface(const TcsParams& params, const Shape& body, double shell_mm) {

@@ -319,6 +319,26 @@ double share_along(const Shape& shape, double length, double cell) {
   return inside / all;
 }
 
+TEST(Graded, follows_its_field_however_the_lattice_lies) {
+  const Shape field = ramp(1, 1.5, -30, 30);
+  for (const TcsParams& p :
+       {TcsParams{.grade = TcsGrade::Surface, .grade_depth_mm = 60}, TcsParams{.cell_mm = 8, .stretch_z = true},
+        TcsParams{.cell_mm = {7, 8, 9}}, TcsParams{.shift_mm = {1, 2, 3}, .rotate_deg = {20, -35, 110}},
+        TcsParams{.cell_mm = 8, .shift_mm = {4, -2, 9}, .rotate_deg = {0, 30, 0}, .stretch_z = true}}) {
+    const Shape graded = crystal(p, field);
+    Random random(4, "tcs_test");
+    for (int i = 0; i < 300; ++i) {
+      const Vec3d at{20 * random.uniform() - 10, 20 * random.uniform() - 10, 20 * random.uniform() - 10};
+      TcsParams even = p;
+      even.grade = TcsGrade::None;
+      const double factor = field(at);
+      even.stick_mm *= factor;
+      even.ball_mm *= factor;
+      ASSERT_NEAR(graded(at), crystal(even)(at), 2e-4);
+    }
+  }
+}
+
 TEST(GradedDensity, is_met_in_the_mean_by_every_form) {
   constexpr double length = 60;
   for (const auto& [form, cell] :
