@@ -141,7 +141,9 @@ Shape thicker_where_stressed(const StressGrade& grade, const Box3d& box, const S
   return Shape(std::move(table));
 }
 
-Shape depth_table(const Shape& body, const Box3d& box, double step_mm, const Context& context) {
+namespace {
+
+std::shared_ptr<Table> depths(const Shape& body, const Box3d& box, double step_mm, const Context& context) {
   constexpr int edge = 4;  // entries of a neighbourhood
   const auto table = table_over(box, step_mm);
   table->steepest = std::sqrt(3.0);
@@ -160,7 +162,33 @@ Shape depth_table(const Shape& body, const Box3d& box, double step_mm, const Con
     for (int j = 0; j < ny; j += edge)
       for (int i = 0; i < nx; i += edge) fill(i, j, slab * edge);
   });
-  return Shape(table);
+  return table;
+}
+
+}  // namespace
+
+Shape depth_table(const Shape& body, const Box3d& box, double step_mm, const Context& context) {
+  return Shape(depths(body, box, step_mm, context));
+}
+
+std::vector<Vec3d> places_inside(const Shape& body, const Box3d& box, double volume_mm3, double shell_mm,
+                                 const Shape& where, const Context& context) {
+  constexpr double places = 20000, least_share = 0.05;  // of the box: what an open model encloses may be anything
+  const Vec3d size = box.size();
+  const double volume = std::max(volume_mm3, least_share * size.x * size.y * size.z);
+  const auto table = depths(body, box, std::cbrt(volume / places), context);
+  std::vector<Vec3d> inside;
+  for (int k = 0; k < table->size[2]; ++k)
+    for (int j = 0; j < table->size[1]; ++j)
+      for (int i = 0; i < table->size[0]; ++i)
+        if (table->value[table->at(i, j, k)] < -shell_mm) inside.push_back(table->place(i, j, k));
+  std::vector<float> there(inside.size());
+  where.evaluate(inside, there);
+  std::size_t kept = 0;
+  for (std::size_t n = 0; n < inside.size(); ++n)
+    if (there[n] < 0) inside[kept++] = inside[n];
+  inside.resize(kept);
+  return inside;
 }
 
 }  // namespace fibrolite

@@ -21,7 +21,7 @@
 namespace fibrolite {
 
 Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report, const Context& context) {
-  const Recipe& recipe = params.recipe;
+  Recipe recipe = params.recipe;
   const double voxel = choose_voxel(bounds(model.mesh), recipe, params.infill, params.voxel_mm);
   check_recipe(recipe, voxel, params.infill);
   Run run(report, context);
@@ -58,6 +58,9 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   run("infill", 0.40, [&](const Context& c) {
     if (sections || recipe.tcs.grade != TcsGrade::None) model_distance = distance_to(WindingTree(model.mesh));
     const auto thickness = grading(bounds(model.mesh), model_distance, recipe, stress_mpa, c);
+    if (thickness)
+      recipe.tcs =
+          at_density(recipe, *thickness, out.parts, params.infill, model.mesh, model_distance, voxel, report, c);
     for (const Part& p : out.parts.parts) fills.push_back(fill(p, params.infill, recipe, model_distance, thickness));
   });
   std::vector<double> demand_n;

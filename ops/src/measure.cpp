@@ -14,6 +14,9 @@ using Values = std::array<float, PointBlock::capacity>;
 /// Share of a voxel below zero, from the distance at its sample.
 float below(float distance, float inverse_voxel) { return std::clamp(0.5F - distance * inverse_voxel, 0.0F, 1.0F); }
 
+/// What of a voxel's material is not the shell's, which fills what the lumen leaves of the part.
+float beside_shell(float solid, float part, float lumen) { return std::clamp(solid - (part - lumen), 0.0F, lumen); }
+
 PartSums rounded(const PartSums& sums) {
   const Vec3d m = sums.moment_mm;
   return {rounded_for_sums(sums.part),
@@ -75,7 +78,7 @@ PartSums one_part(const Values& body, const Values& solid, const PointBlock& blo
         const float deep = below(body[k] + shell, inverse);
         row.of[z] = below(body[k], inverse);
         lumen.of[z] += deep;
-        infill.of[z] += std::min(deep, below(solid[k], inverse));
+        infill.of[z] += beside_shell(below(solid[k], inverse), row.of[z], deep);
         slice.of[z] += row.of[z];
       }
       moment.y += row.total() * static_cast<double>(block.y[64 * x + 8 * y]);
@@ -94,7 +97,7 @@ void add_parts(const Values& body, const Values& solid, const std::vector<Values
   for (std::size_t k = 0; k < PointBlock::capacity; ++k) {
     const float part = below(body[k], inverse);
     if (part <= 0) continue;
-    const float lumen = below(body[k] + shell, inverse), infill = std::min(lumen, below(solid[k], inverse));
+    const float lumen = below(body[k] + shell, inverse), infill = beside_shell(below(solid[k], inverse), part, lumen);
     for (std::size_t r = 0; r < shares.size(); ++r) {
       const float share = shares[r][k];
       if (share <= 0) continue;

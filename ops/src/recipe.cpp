@@ -87,7 +87,7 @@ void check_tcs(const TcsParams& given) {
               .append(number_text(cell.most())),
           "recipe", "use edges that are at most 3 times each other");
   const bool sheet = tcs.form == TcsForm::Sheet;
-  const double member = members(tcs).most_mm, times = cell_per_member(tcs.form);
+  const double member = members(given).most_mm, times = cell_per_member(tcs.form);
   if (cell.least() < times * member * (1 - 1e-12))
     unfit(std::string("tcs.cell_mm is ")
               .append(number_text(cell.least()))

@@ -11,6 +11,7 @@
 #include "fibrolite/blocks.h"
 #include "fibrolite/ops/grading.h"
 #include "fibrolite/ops/sleeve.h"
+#include "fibrolite/ops/text.h"
 #include "fibrolite/ops/trim.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/to_solid.h"
@@ -67,7 +68,37 @@ std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& 
     const StressGrade grade{.least = tcs.grade_least, .most = tcs.grade_most, .slope_mm = depth};
     return thicker_where_stressed(grade, box, body, stress_mpa, context);
   }
-  return thicker_at_surface(tcs, depth_table(body, box, depth / 6, context), shell_mm);
+  return thicker_at_surface(tcs, depth_table(body, box, depth / 4, context), shell_mm);
+}
+
+TcsParams at_density(const Recipe& recipe, const Shape& thickness, const Parts& parts, InfillKind run,
+                     const Mesh& model, const Shape& body, double voxel_mm, Report& report, const Context& context) {
+  if (!recipe.tcs.density) return recipe.tcs;
+  std::vector<Shape> crystals;
+  for (const Part& part : parts.parts)
+    if (infill_of(part, run) == PartInfill::Tcs) crystals.push_back(part.region());
+  if (crystals.empty()) return recipe.tcs;
+  const std::vector<Vec3d> places = places_inside(body, bounds(model), signed_volume(model), recipe.shell.thickness_mm,
+                                                  unite(std::move(crystals)), context);
+  std::vector<float> factors(places.size(), 1.0F);
+  thickness.evaluate(places, factors);
+  if (factors.empty()) factors.push_back(1);  // no lumen, no crystal: any size will do
+  const GradedSizes found = sized(recipe.tcs, factors, 2 * voxel_mm);
+  const double wanted = *recipe.tcs.density;
+  if (std::abs(found.density / wanted - 1) > 0.01) {
+    const MemberRange range = members(found.params);
+    report.warnings.push_back(std::string("tcs.density: ")
+                                  .append(number_text(wanted))
+                                  .append(" was asked for, ")
+                                  .append(number_text(std::round(1e4 * found.density) / 1e4))
+                                  .append(found.density > wanted ? " is the least that members of two voxels, "
+                                                                 : " is the most that members the cell has room for, ")
+                                  .append(number_text(std::round(1e3 * range.least_mm) / 1e3))
+                                  .append(" to ")
+                                  .append(number_text(std::round(1e3 * range.most_mm) / 1e3))
+                                  .append(" mm, give with this grading"));
+  }
+  return found.params;
 }
 
 Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,

@@ -47,6 +47,11 @@ class Run {
 /// How much thicker the crystal is where (TcsParams::grade); none if it is not graded. `stress_mpa`: of a hybrid.
 [[nodiscard]] std::optional<Shape> grading(const Box3d& box, const Shape& body, const Recipe& recipe,
                                            const std::function<double(Vec3d)>& stress_mpa, const Context& context);
+/// Sizes with which the graded crystal has the recipe's density in the mean over the lumens it fills; the recipe's own
+/// if it gives no density. A density out of reach goes into the report. `model`: closed, of the body.
+[[nodiscard]] TcsParams at_density(const Recipe& recipe, const Shape& thickness, const Parts& parts, InfillKind run,
+                                   const Mesh& model, const Shape& body, double voxel_mm, Report& report,
+                                   const Context& context);
 [[nodiscard]] Fill fill(const Part& part, InfillKind run, const Recipe& recipe, const Shape& body,
                         const std::optional<Shape>& thickness);
 

@@ -5,6 +5,8 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <numbers>
+#include <vector>
 
 #include "fibrolite/random.h"
 #include "refusal.h"
@@ -86,6 +88,24 @@ TEST(DepthTable, SameBitsOnOneAndTwoThreads) {
   };
   const Shape one = made(1), two = made(2);
   for (int i = 0; i < 100; ++i) EXPECT_EQ(one({i + 0.3, 7, 3}), two({i + 0.3, 7, 3}));
+}
+
+TEST(PlacesInside, GiveMeansOverTheLumen) {
+  constexpr double radius = 20, shell = 2, inner = radius - shell;
+  const Shape ball = sphere({1, 2, 3}, radius);
+  const Box3d box{{-19, -18, -17}, {21, 22, 23}};
+  const double volume = 4.0 / 3 * std::numbers::pi * radius * radius * radius;
+  const auto mean = [&](const std::vector<Vec3d>& places) {
+    double sum = 0;
+    for (const Vec3d p : places) sum += dot(p - Vec3d{1, 2, 3}, p - Vec3d{1, 2, 3});
+    return sum / static_cast<double>(places.size());
+  };
+  const auto whole = places_inside(ball, box, volume, shell, everything());
+  EXPECT_NEAR(static_cast<double>(whole.size()) / 20000, std::pow(inner / radius, 3), 0.01);
+  EXPECT_NEAR(mean(whole) / (0.6 * inner * inner), 1, 0.005);
+  const auto half = places_inside(ball, box, volume, shell, half_space({1, 2, 3.1}, {0, 0, 1}));
+  EXPECT_NEAR(static_cast<double>(half.size()) / static_cast<double>(whole.size()), 0.5, 0.03);
+  EXPECT_TRUE(places_inside(ball, box, volume, shell, nothing()).empty());
 }
 
 TEST(Grading, RangesAreChecked) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fibrolite/ops/hybridize.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/Composite.h>
 
@@ -9,6 +10,7 @@
 #include <map>
 #include <string>
 
+#include "fibrolite/random.h"
 #include "fibrolite/vdb.h"
 #include "hybrid_runs.h"
 #include "models.h"
@@ -17,7 +19,10 @@ namespace fibrolite {
 namespace {
 
 using testing::asset;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using testing::hybridized;
+using ::testing::IsEmpty;
 using testing::Outcome;
 using testing::sturdy;
 
@@ -42,6 +47,7 @@ TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density)
     const PartReport part = even.parts.at(0);
     EXPECT_NEAR(part.infill_volume_mm3 / part.lumen_mm3, 0.2, 0.03);
 
+    params.recipe.tcs = sized(params.recipe.tcs);  // the same sizes, to be thicker than
     params.recipe.tcs.grade = TcsGrade::Surface;
     params.recipe.tcs.grade_most = 1.4;
     params.recipe.tcs.grade_depth_mm = 12;
@@ -49,6 +55,46 @@ TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density)
     EXPECT_EQ(thicker.solid.pieces, 1);
     EXPECT_GT(thicker.parts.at(0).infill_volume_mm3, 1.15 * part.infill_volume_mm3);
   }
+}
+
+/// Counted in the finished solid at random points, not taken from the report.
+double crystal_share(const Outcome& made, double shell_mm) {
+  Random random(3, "hybridize_test");
+  const Box3d box = made.hybrid.solid.bounds_mm();
+  std::vector<Vec3d> points;
+  for (int i = 0; i < 600000; ++i)
+    points.push_back(box.min + Vec3d{box.size().x * random.uniform(), box.size().y * random.uniform(),
+                                     box.size().z * random.uniform()});
+  std::vector<float> depth(points.size());
+  made.hybrid.body.evaluate(points, depth);
+  int lumen = 0, material = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (static_cast<double>(depth[i]) >= -shell_mm) continue;
+    ++lumen;
+    material += made.hybrid.solid.distance(points[i]) < 0 ? 1 : 0;
+  }
+  return static_cast<double>(material) / lumen;
+}
+
+TEST(Hybridize, a_graded_crystal_has_the_wanted_density_in_the_mean) {
+  const Mesh mesh = model("rounded_box");
+  HybridizeParams params;
+  params.infill = InfillKind::Tcs;
+  params.voxel_mm = 0.25;
+  for (const TcsForm form : {TcsForm::Sticks, TcsForm::Network}) {
+    params.recipe.tcs = {.form = form, .density = 0.2, .grade = TcsGrade::Surface, .grade_most = 1.4};
+    const Outcome made = hybridized(mesh, params);
+    EXPECT_THAT(made.report.warnings, IsEmpty());
+    const PartReport part = made.report.parts.at(0);
+    EXPECT_NEAR(part.infill_volume_mm3 / part.lumen_mm3, 0.2, 0.01 * 0.2);
+    EXPECT_NEAR(crystal_share(made, params.recipe.shell.thickness_mm), 0.2, 0.01 * 0.2);
+  }
+  // Thinner members than two voxels would do it.
+  params.recipe.tcs.density = 0.13;
+  params.recipe.tcs.grade_most = 2;
+  const Report thick = hybridized(mesh, params).report;
+  EXPECT_THAT(thick.warnings, ElementsAre(HasSubstr("tcs.density: 0.13 was asked for, 0.1")));
+  EXPECT_GT(thick.parts.at(0).infill_volume_mm3, 1.02 * 0.13 * thick.parts.at(0).lumen_mm3);
 }
 
 TEST(Hybridize, print_checks_can_be_left_out) {

@@ -29,6 +29,21 @@ TEST(Measure, parts_share_a_sphere) {
   EXPECT_NEAR(parts[1].centroid_mm.z, 3.0 / 8 * 10, 0.05);
 }
 
+/// Wherever the shell's inner face runs through its voxels.
+TEST(Measure, a_shell_alone_is_no_infill) {
+  for (const double inner : {8.9, 9.0, 9.05}) {
+    const Solid body = realize(cuboid({{-10, -10, -10}, {10, 10, 10}}), box, {.voxel_mm = 0.25, .band_vox = 8});
+    const Solid solid = realize(
+        subtract(cuboid({{-10, -10, -10}, {10, 10, 10}}), cuboid({{-inner, -inner, -inner}, {inner, inner, inner}})),
+        body);
+    for (const Shape& region : {everything(), half_space({0, 0, 0.03}, {0, 0, 1})}) {
+      const auto parts = measure(body, solid, {region, complement(region)}, 10 - inner);
+      EXPECT_LT(parts[0].infill_mm3 / parts[0].lumen_mm3, 0.001) << inner;
+    }
+    EXPECT_LT(measure(body, solid, {everything()}, 10 - inner)[0].infill_mm3, 6) << inner;
+  }
+}
+
 TEST(Measure, same_bits_on_one_and_two_threads) {
   const Solid body = realize(sphere({0, 0, 0}, 10), box, {.voxel_mm = 0.3, .band_vox = 6});
   double part[2], moment[2];

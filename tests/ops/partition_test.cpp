@@ -176,6 +176,36 @@ TEST(Partition, ATorusIsOneRingWithItsCentreLine) {
   EXPECT_TRUE(p.partition.cuts.empty());
 }
 
+// Around z, ring_mm to the middle of a tube that is thinnest, thin_mm instead of tube_mm, at one angle.
+Shape uneven_ring(double ring_mm, double tube_mm, double thin_mm, double thin_at) {
+  constexpr int pieces = 120;
+  const auto angle = [](int i) { return 2 * std::numbers::pi * i / pieces; };
+  const auto place = [&](int i) { return Vec3d{ring_mm * std::cos(angle(i)), ring_mm * std::sin(angle(i)), 0}; };
+  const auto radius = [&](int i) {
+    const double off = std::remainder(angle(i) - thin_at, 2 * std::numbers::pi) / 0.5;
+    return tube_mm - (tube_mm - thin_mm) * std::exp(-off * off);
+  };
+  std::vector<Shape> links;
+  for (int i = 0; i < pieces; ++i) links.push_back(round_cone(place(i), radius(i), place(i + 1), radius(i + 1)));
+  return unite(std::move(links));
+}
+
+TEST(Partition, ARingIsCutWhereItIsThinnest) {
+  for (const double degrees : {10.0, 133.0, 275.0}) {
+    const double thin_at = degrees * std::numbers::pi / 180;
+    const Parted p = parted(uneven_ring(30, 7, 5, thin_at), Box3d{{-39, -39, -9}, {39, 39, 9}}, 1.3);
+    ASSERT_EQ(p.partition.candidates.size(), 1U);
+    const Candidate& ring = p.partition.candidates[0];
+    ASSERT_NE(ring.reason.find("ring"), std::string::npos) << ring.reason;
+    // The line starts and ends in the cut.
+    const Vec3d cut = ring.axis.centre_line().front();
+    EXPECT_LT(norm(cut - ring.axis.centre_line().back()), 1e-6);
+    const double off = std::remainder(std::atan2(cut.y, cut.x) - thin_at, 2 * std::numbers::pi);
+    EXPECT_LT(std::abs(30 * off), 0.25 * 14) << degrees;                  // of the ring's width
+    EXPECT_LT(7 - 2 * std::exp(-off * off / 0.25), 1.03 * 5) << degrees;  // its radius there
+  }
+}
+
 TEST(Partition, AYIsThreeLimbs) {
   const Parted p = parted(y_shape(), y_box, 1.2);
   ASSERT_EQ(p.partition.candidates.size(), 3U);

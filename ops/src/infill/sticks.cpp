@@ -7,10 +7,16 @@
 #include <cstddef>
 #include <memory>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 namespace fibrolite {
 namespace {
+
+struct Lattice : Shape::Function {
+  /// Distances to the nearest bond and to the nearest node, mm.
+  virtual void apart(const PointBlock& block, float* bond, float* node) const = 0;
+};
 
 /// Exact distance to the diamond lattice in O(1), by folding.
 ///
@@ -19,7 +25,7 @@ namespace {
 /// along A, by any permutation of the axes and by flipping two signs. So a point is moved into the Voronoi cell of the
 /// A node at the origin and then folded to x >= y >= |z|; there the nearest bond is always the one from (0,0,0) to
 /// (1,1,1). Stretched along z only x and y may be exchanged, and one of four bonds is nearest.
-struct Crystal final : Shape::Function {
+struct Crystal final : Lattice {
   Crystal(double edge_mm, double stretch_z, const Radii& r, Vec3d shift_mm)
       : quarter(static_cast<float>(0.25 * edge_mm)),
         stretch(static_cast<float>(stretch_z)),
@@ -33,6 +39,15 @@ struct Crystal final : Shape::Function {
       cubic(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stick, ball, out);
     } else {
       stretched(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stretch, stick, ball, out);
+    }
+  }
+
+  void apart(const PointBlock& block, float* bond, float* node) const override {
+    const auto sx = static_cast<float>(shift.x), sy = static_cast<float>(shift.y), sz = static_cast<float>(shift.z);
+    if (stretch == 1.0F) {
+      cubic_apart(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, bond, node);
+    } else {
+      stretched_apart(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stretch, bond, node);
     }
   }
 
@@ -62,18 +77,35 @@ struct Crystal final : Shape::Function {
     return {a, b, c, sign};
   }
 
+  struct Nearest {
+    float bond, node;  // squared, quarter cells
+  };
+  static Nearest nearest_cubic(float px, float py, float pz) {
+    const Folded f = fold(px, py, pz);
+    const float high = std::max(f.a, std::max(f.b, f.c)), low = std::min(f.a, std::min(f.b, f.c));
+    const float x = high, y = f.a + f.b + f.c - high - low, z = low * f.sign;
+    const float t = std::min(std::max((x + y + z) * (1.0F / 3.0F), 0.0F), 1.0F);
+    return {(x - t) * (x - t) + (y - t) * (y - t) + (z - t) * (z - t),
+            std::min(x * x + y * y + z * z, (x - 1) * (x - 1) + (y - 1) * (y - 1) + (z - 1) * (z - 1))};
+  }
+
   [[gnu::target_clones("avx2", "default")]] static void cubic(const float* px, const float* py, const float* pz,
                                                               int count, float sx, float sy, float sz, float quarter,
                                                               float stick, float ball, float* out) {
     const float inverse = 1.0F / quarter;
     for (int i = 0; i < count; ++i) {
-      const Folded f = fold((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse);
-      const float high = std::max(f.a, std::max(f.b, f.c)), low = std::min(f.a, std::min(f.b, f.c));
-      const float x = high, y = f.a + f.b + f.c - high - low, z = low * f.sign;
-      const float t = std::min(std::max((x + y + z) * (1.0F / 3.0F), 0.0F), 1.0F);
-      const float bond = (x - t) * (x - t) + (y - t) * (y - t) + (z - t) * (z - t);
-      const float node = std::min(x * x + y * y + z * z, (x - 1) * (x - 1) + (y - 1) * (y - 1) + (z - 1) * (z - 1));
-      out[i] = std::min(std::sqrt(bond) * quarter - stick, std::sqrt(node) * quarter - ball);
+      const Nearest n = nearest_cubic((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse);
+      out[i] = std::min(std::sqrt(n.bond) * quarter - stick, std::sqrt(n.node) * quarter - ball);
+    }
+  }
+  [[gnu::target_clones("avx2", "default")]] static void cubic_apart(const float* px, const float* py, const float* pz,
+                                                                    int count, float sx, float sy, float sz,
+                                                                    float quarter, float* bond, float* node) {
+    const float inverse = 1.0F / quarter;
+    for (int i = 0; i < count; ++i) {
+      const Nearest n = nearest_cubic((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse);
+      bond[i] = std::sqrt(n.bond) * quarter;
+      node[i] = std::sqrt(n.node) * quarter;
     }
   }
 
@@ -85,19 +117,32 @@ struct Crystal final : Shape::Function {
     return ux * ux + uy * uy + uz * uz;
   }
 
+  static Nearest nearest_stretched(float px, float py, float pz, float k) {
+    const Folded f = fold(px, py, pz);
+    const float x = std::max(f.a, f.b), y = std::min(f.a, f.b), z = f.c * f.sign;
+    return {std::min(std::min(bond2(x, y, z, 0, 0, 0, 1, 1, 1, k), bond2(x, y, z, 0, 0, 0, 1, -1, -1, k)),
+                     std::min(bond2(x, y, z, 2, 0, -2, -1, -1, 1, k), bond2(x, y, z, 2, 0, 2, -1, 1, -1, k))),
+            std::min(x * x + y * y + k * k * z * z,
+                     std::min((x - 1) * (x - 1) + (y - 1) * (y - 1) + k * k * (z - 1) * (z - 1),
+                              (x - 1) * (x - 1) + (y + 1) * (y + 1) + k * k * (z + 1) * (z + 1)))};
+  }
   static void stretched(const float* px, const float* py, const float* pz, int count, float sx, float sy, float sz,
                         float quarter, float k, float stick, float ball, float* out) {
     const float inverse = 1.0F / quarter;
     for (int i = 0; i < count; ++i) {
-      const Folded f = fold((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse / k);
-      const float x = std::max(f.a, f.b), y = std::min(f.a, f.b), z = f.c * f.sign;
-      const float bond =
-          std::min(std::min(bond2(x, y, z, 0, 0, 0, 1, 1, 1, k), bond2(x, y, z, 0, 0, 0, 1, -1, -1, k)),
-                   std::min(bond2(x, y, z, 2, 0, -2, -1, -1, 1, k), bond2(x, y, z, 2, 0, 2, -1, 1, -1, k)));
-      const float node = std::min(x * x + y * y + k * k * z * z,
-                                  std::min((x - 1) * (x - 1) + (y - 1) * (y - 1) + k * k * (z - 1) * (z - 1),
-                                           (x - 1) * (x - 1) + (y + 1) * (y + 1) + k * k * (z + 1) * (z + 1)));
-      out[i] = std::min(std::sqrt(bond) * quarter - stick, std::sqrt(node) * quarter - ball);
+      const Nearest n =
+          nearest_stretched((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse / k, k);
+      out[i] = std::min(std::sqrt(n.bond) * quarter - stick, std::sqrt(n.node) * quarter - ball);
+    }
+  }
+  static void stretched_apart(const float* px, const float* py, const float* pz, int count, float sx, float sy,
+                              float sz, float quarter, float k, float* bond, float* node) {
+    const float inverse = 1.0F / quarter;
+    for (int i = 0; i < count; ++i) {
+      const Nearest n =
+          nearest_stretched((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse / k, k);
+      bond[i] = std::sqrt(n.bond) * quarter;
+      node[i] = std::sqrt(n.node) * quarter;
     }
   }
 
@@ -107,15 +152,23 @@ struct Crystal final : Shape::Function {
 
 /// Exact distance for any edges of the cell, a few times slower. Folding may not exchange axes now, and which bonds can
 /// be nearest to a folded point depends on the edges: they are found once.
-struct AnyCell final : Shape::Function {
+struct AnyCell final : Lattice {
   AnyCell(const CellEdges& cell, const Radii& r, Vec3d shift_mm)
       : quarter{0.25 * cell.x, 0.25 * cell.y, 0.25 * cell.z}, radii(r), shift(shift_mm) {
     choose();
   }
 
   void evaluate(const PointBlock& block, float* out) const override {
+    std::array<float, PointBlock::capacity> bond, node;
+    apart(block, bond.data(), node.data());
+    const auto stick = static_cast<float>(radii.stick_mm), ball = static_cast<float>(radii.ball_mm);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i)
+      out[i] = std::min(bond[i] - stick, node[i] - ball);
+  }
+
+  void apart(const PointBlock& block, float* bond, float* node) const override {
     const Vec3f q = to_float(quarter), s = to_float(shift);
-    std::array<float, PointBlock::capacity> x, y, z, bond, node;
+    std::array<float, PointBlock::capacity> x, y, z;
     const auto count = static_cast<std::size_t>(block.count);
     for (std::size_t i = 0; i < count; ++i) {
       const Crystal::Folded f =
@@ -137,8 +190,10 @@ struct AnyCell final : Shape::Function {
         const float px = x[i] - n.x, py = y[i] - n.y, pz = z[i] - n.z;
         node[i] = std::min(node[i], px * px + py * py + pz * pz);
       }
-    const auto stick = static_cast<float>(radii.stick_mm), ball = static_cast<float>(radii.ball_mm);
-    for (std::size_t i = 0; i < count; ++i) out[i] = std::min(std::sqrt(bond[i]) - stick, std::sqrt(node[i]) - ball);
+    for (std::size_t i = 0; i < count; ++i) {
+      bond[i] = std::sqrt(bond[i]);
+      node[i] = std::sqrt(node[i]);
+    }
   }
 
   struct Bond {
@@ -199,6 +254,35 @@ struct AnyCell final : Shape::Function {
   std::vector<Vec3f> nodes;
 };
 
+/// Sticks and balls whose radii are multiplied by a field.
+struct Swollen final : Shape::Function {
+  Swollen(std::shared_ptr<const Lattice> bonds_and_nodes, const Radii& r, Shape factors)
+      : lattice(std::move(bonds_and_nodes)), radii(r), thickness(std::move(factors)) {}
+  void evaluate(const PointBlock& block, float* out) const override {
+    std::array<float, PointBlock::capacity> bond, node;
+    thickness.evaluate(block, out);
+    lattice->apart(block, bond.data(), node.data());
+    const auto stick = static_cast<float>(radii.stick_mm), ball = static_cast<float>(radii.ball_mm);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(block.count); ++i)
+      out[i] = std::min(bond[i] - stick * out[i], node[i] - ball * out[i]);
+  }
+  [[nodiscard]] double lipschitz() const override {
+    return 1 + std::max(radii.stick_mm, radii.ball_mm) * thickness.lipschitz();
+  }
+  std::shared_ptr<const Lattice> lattice;
+  Radii radii;
+  Shape thickness;
+};
+
+std::shared_ptr<const Lattice> lattice_of(const CellEdges& cell, const Radii& radii, Vec3d shift_mm) {
+  const double ratio = cell.z / cell.x;
+  const bool square = cell.x == cell.y;
+  for (const double known : {1.0, std::numbers::sqrt2})
+    if (square && std::abs(ratio - known) < 1e-12)
+      return std::make_shared<const Crystal>(cell.x, known, radii, shift_mm);
+  return std::make_shared<const AnyCell>(cell, radii, shift_mm);
+}
+
 }  // namespace
 
 void each_diamond_bond(Vec3i low, Vec3i high, const std::function<void(Vec3i node, Vec3i along)>& visit) {
@@ -212,12 +296,11 @@ void each_diamond_bond(Vec3i low, Vec3i high, const std::function<void(Vec3i nod
 }
 
 Shape sticks_and_balls(const CellEdges& cell, const Radii& radii, Vec3d shift_mm) {
-  const double ratio = cell.z / cell.x;
-  const bool square = cell.x == cell.y;
-  for (const double known : {1.0, std::numbers::sqrt2})
-    if (square && std::abs(ratio - known) < 1e-12)
-      return Shape(std::make_shared<const Crystal>(cell.x, known, radii, shift_mm));
-  return Shape(std::make_shared<const AnyCell>(cell, radii, shift_mm));
+  return Shape(lattice_of(cell, radii, shift_mm));
+}
+
+Shape sticks_and_balls(const CellEdges& cell, const Radii& radii, Vec3d shift_mm, const Shape& thickness) {
+  return Shape(std::make_shared<const Swollen>(lattice_of(cell, radii, shift_mm), radii, thickness));
 }
 
 }  // namespace fibrolite

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,33 +30,20 @@ struct Network final : Shape::Function {
 
 using Values = std::array<float, PointBlock::capacity>;
 
-/// Distances to lines, points or a surface, less a radius that is `thickness` times a given one.
-struct Graded final : Shape::Function {
-  struct Member {
-    Shape middle;
-    double radius_mm;
-  };
-  Graded(std::vector<Member> list, Shape factors) : members(std::move(list)), thickness(std::move(factors)) {}
+/// Distance to a surface, less half of a wall that is `thickness` times as thick as a given one.
+struct GradedSheet final : Shape::Function {
+  GradedSheet(Shape surface, double wall_mm, Shape factors)
+      : middle(std::move(surface)), half_mm(0.5 * wall_mm), thickness(std::move(factors)) {}
   void evaluate(const PointBlock& block, float* out) const override {
-    Values factor, value;
+    Values factor;
     thickness.evaluate(block, factor.data());
-    std::fill_n(out, block.count, far_mm);
-    for (const Member& m : members) {
-      m.middle.evaluate(block, value.data());
-      const auto radius = static_cast<float>(m.radius_mm);
-      for (int i = 0; i < block.count; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        out[i] = std::min(out[i], value[k] - radius * factor[k]);
-      }
-    }
+    middle.evaluate(block, out);
+    const auto half = static_cast<float>(half_mm);
+    for (int i = 0; i < block.count; ++i) out[i] -= half * factor[static_cast<std::size_t>(i)];
   }
-  [[nodiscard]] double lipschitz() const override {
-    double steepest = 0;
-    for (const Member& m : members)
-      steepest = std::max(steepest, m.middle.lipschitz() + m.radius_mm * thickness.lipschitz());
-    return steepest;
-  }
-  std::vector<Member> members;
+  [[nodiscard]] double lipschitz() const override { return middle.lipschitz() + half_mm * thickness.lipschitz(); }
+  Shape middle;
+  double half_mm;
   Shape thickness;
 };
 
@@ -253,18 +241,51 @@ Fill filled(const TcsParams& p, Shape shape, const std::optional<Shape>& thickne
   return fill;
 }
 
+/// How much thicker than given the thickest members of a cell can be.
+double most_scale(const TcsParams& p, double thickest_mm) {
+  return p.cell_mm.least() / cell_per_member(p.form) / thickest_mm;
+}
+
+double membrane_of(const TcsParams& p) { return p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0; }
+
+/// Share of material against how many times as thick members are, linear between values.
+class DensityCurve {
+ public:
+  DensityCurve(const TcsParams& p, double least, double most) : least_(least), step_((most - least) / steps) {
+    const double area = membrane_of(p);
+    for (std::size_t i = 0; i < value_.size(); ++i)
+      value_[i] = measured(scaled(p, least + step_ * static_cast<double>(i)), area);
+  }
+  /// Over all places, each with members `scale` times its factor times as thick.
+  [[nodiscard]] double mean(std::span<const float> factors, double scale) const {
+    double sum = 0;
+    for (const float f : factors) {
+      const double place =
+          step_ > 0 ? std::clamp((scale * static_cast<double>(f) - least_) / step_, 0.0, 1.0 * steps) : 0;
+      const auto below = std::min(static_cast<std::size_t>(place), value_.size() - 2);
+      sum += std::lerp(value_[below], value_[below + 1], place - static_cast<double>(below));
+    }
+    return sum / static_cast<double>(factors.size());
+  }
+
+ private:
+  static constexpr int steps = 32;
+  double least_, step_;
+  std::array<double, steps + 1> value_{};
+};
+
 }  // namespace
 
 MemberRange members(const TcsParams& params) {
   const double given = member_mm(sized(params));
-  if (params.grade == TcsGrade::None) return {given, given};
+  if (params.grade == TcsGrade::None || params.density) return {given, given};
   return {params.grade_least * given, params.grade_most * given};
 }
 
 double density(const TcsParams& params) {
   const TcsParams p = sized(params);
   check(p);
-  return measured(p, p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0);
+  return measured(p, membrane_of(p));
 }
 
 TcsParams sized(const TcsParams& params) {
@@ -272,11 +293,10 @@ TcsParams sized(const TcsParams& params) {
   TcsParams p = params;
   p.density.reset();
   check_cell(p);
-  const double wanted = *params.density;
-  const double area = p.form == TcsForm::Sheet ? membrane_mm2(Surface::D, cell_of(p)) : 0;
+  const double wanted = *params.density, area = membrane_of(p);
   const auto of = [&](double scale) { return measured(scaled(p, scale), area); };
   // The thickest members a cell may have, and the thinnest worth a name; density rises with thickness.
-  double high = p.cell_mm.least() / cell_per_member(p.form) / members(p).most_mm, low = 0.04 * high;
+  double high = most_scale(p, member_mm(p)), low = 0.04 * high;
   const double most = of(high), least = of(low);
   if (!(wanted >= least && wanted <= most))
     refuse(std::string("no ")
@@ -295,6 +315,24 @@ TcsParams sized(const TcsParams& params) {
   return scaled(p, 0.5 * (low + high));
 }
 
+GradedSizes sized(const TcsParams& params, std::span<const float> factors, double least_mm) {
+  const TcsParams p = sized(params);
+  const MemberRange given = members(p);
+  double high = most_scale(p, given.most_mm), low = std::max(least_mm / given.least_mm, 0.04 * high);
+  if (!(low <= high))
+    refuse("no cell of this size has room for members from " + number_text(least_mm) + " mm up to " +
+               number_text(p.grade_most / p.grade_least) + " times that",
+           "tcs.grade_most", "use a larger tcs.cell_mm, or a grade_most nearer to grade_least");
+  const DensityCurve curve(p, low * p.grade_least, high * p.grade_most);
+  const double wanted = params.density.value_or(curve.mean(factors, 1));
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (curve.mean(factors, middle) < wanted ? low : high) = middle;
+  }
+  const double scale = 0.5 * (low + high);
+  return {scaled(p, scale), curve.mean(factors, scale)};
+}
+
 Shape crystal(const TcsParams& params) {
   const TcsParams p = sized(params);
   check(p);
@@ -310,26 +348,24 @@ Shape crystal(const TcsParams& params, const Shape& thickness) {
     change(other);
     return is_turned(p) ? placed(in_lattice(other, {}), lattice(p)) : in_lattice(other, p.shift_mm);
   };
-  constexpr double none = -2 * far_mm;
-  std::vector<Graded::Member> list;
   switch (p.form) {
-    case TcsForm::Sticks:
-      list.push_back({of([](TcsParams& q) { q.stick_mm = 0, q.ball_mm = none; }), 0.5 * p.stick_mm});
-      list.push_back({of([](TcsParams& q) { q.stick_mm = none, q.ball_mm = 0; }), 0.5 * p.ball_mm});
-      break;
-    case TcsForm::Sheet:
-      list.push_back({of([](TcsParams& q) { q.wall_mm = 0; }), 0.5 * p.wall_mm});
-      break;
-    case TcsForm::Network: {
-      constexpr int sizes = 5;
-      std::vector<Shape> network;
-      for (int i = 0; i < sizes; ++i)
-        network.push_back(
-            of([&](TcsParams& q) { q.stick_mm *= p.grade_least + (p.grade_most - p.grade_least) * i / (sizes - 1); }));
-      return Shape(std::make_shared<const Between>(std::move(network), thickness, p));
+    case TcsForm::Sticks: {
+      const Radii radii{0.5 * p.stick_mm, 0.5 * p.ball_mm};
+      if (!is_turned(p)) return sticks_and_balls(cell_of(p), radii, p.shift_mm, thickness);
+      const Frame frame = lattice(p);
+      return placed(sticks_and_balls(cell_of(p), radii, {}, placed(thickness, inverse(frame))), frame);
     }
+    case TcsForm::Sheet:
+      return Shape(std::make_shared<const GradedSheet>(of([](TcsParams& q) { q.wall_mm = 0; }), p.wall_mm, thickness));
+    case TcsForm::Network:
+      break;
   }
-  return Shape(std::make_shared<const Graded>(std::move(list), thickness));
+  constexpr int sizes = 5;
+  std::vector<Shape> network;
+  for (int i = 0; i < sizes; ++i)
+    network.push_back(
+        of([&](TcsParams& q) { q.stick_mm *= p.grade_least + (p.grade_most - p.grade_least) * i / (sizes - 1); }));
+  return Shape(std::make_shared<const Between>(std::move(network), thickness, p));
 }
 
 Shape thicker_at_surface(const TcsParams& params, const Shape& body, double shell_mm) {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bounds.h"
@@ -299,6 +300,82 @@ TEST(Graded, is_the_even_crystal_of_the_thickness_at_each_place) {
       ASSERT_LE(std::abs(graded(at) - graded(at + step)), graded.lipschitz() * norm(step));
     }
   }
+}
+
+/// Ten cells along a ramp, and one across.
+double share_along(const Shape& shape, double length, double cell) {
+  constexpr double step = 0.125;
+  std::vector<Vec3d> row;
+  double inside = 0, all = 0;
+  for (double y = step / 2; y < cell; y += step)
+    for (double z = step / 2; z < cell; z += step) {
+      row.clear();
+      for (double x = step / 2; x < length; x += step) row.push_back({x, y, z});
+      std::vector<float> value(row.size());
+      shape.evaluate(row, value);
+      for (const float v : value) inside += std::clamp(0.5 - v / step, 0.0, 1.0);
+      all += static_cast<double>(row.size());
+    }
+  return inside / all;
+}
+
+TEST(Graded, follows_its_field_however_the_lattice_lies) {
+  const Shape field = ramp(1, 1.5, -30, 30);
+  for (const TcsParams& p :
+       {TcsParams{.grade = TcsGrade::Surface, .grade_depth_mm = 60}, TcsParams{.cell_mm = 8, .stretch_z = true},
+        TcsParams{.cell_mm = {7, 8, 9}}, TcsParams{.shift_mm = {1, 2, 3}, .rotate_deg = {20, -35, 110}},
+        TcsParams{.cell_mm = 8, .shift_mm = {4, -2, 9}, .rotate_deg = {0, 30, 0}, .stretch_z = true}}) {
+    const Shape graded = crystal(p, field);
+    Random random(4, "tcs_test");
+    for (int i = 0; i < 300; ++i) {
+      const Vec3d at{20 * random.uniform() - 10, 20 * random.uniform() - 10, 20 * random.uniform() - 10};
+      TcsParams even = p;
+      even.grade = TcsGrade::None;
+      const double factor = field(at);
+      even.stick_mm *= factor;
+      even.ball_mm *= factor;
+      ASSERT_NEAR(graded(at), crystal(even)(at), 2e-4);
+    }
+  }
+}
+
+TEST(GradedDensity, is_met_in_the_mean_by_every_form) {
+  constexpr double length = 60;
+  for (const auto& [form, cell] :
+       {std::pair(TcsForm::Sticks, 6.0), std::pair(TcsForm::Network, 6.0), std::pair(TcsForm::Sheet, 12.0)})
+    for (const double wanted : {0.12, 0.2}) {
+      const TcsParams p{.form = form,
+                        .cell_mm = cell,
+                        .density = wanted,
+                        .grade = TcsGrade::Surface,
+                        .grade_least = 0.8,
+                        .grade_most = 1.6,
+                        .grade_depth_mm = length};
+      const Shape field = ramp(0.8, 1.6, 0, length);
+      std::vector<float> factors;
+      for (int i = 0; i < 1000; ++i) factors.push_back(field({(i + 0.5) * length / 1000, 0, 0}));
+      const GradedSizes found = sized(p, factors, 0);
+      EXPECT_NEAR(found.density / wanted, 1, 0.005);
+      EXPECT_FALSE(found.params.density.has_value());
+      EXPECT_NEAR(share_along(crystal(found.params, field), length, cell) / wanted, 1, 0.01);
+      EXPECT_NEAR(members(found.params).most_mm / members(found.params).least_mm, 2, 1e-9);
+    }
+}
+
+TEST(GradedDensity, stops_at_the_limits_and_says_what_is_reached) {
+  const std::vector<float> factors{1, 1.2F, 1.5F};
+  const TcsParams p{.density = 0.2, .grade = TcsGrade::Surface};
+  const GradedSizes thick = sized(p, factors, 0.95);
+  EXPECT_NEAR(members(thick.params).least_mm, 0.95, 1e-4);
+  EXPECT_GT(thick.density, 1.01 * 0.2);
+  TcsParams dense = p;
+  dense.density = 0.4;
+  const GradedSizes full = sized(dense, factors, 0);
+  EXPECT_NEAR(members(full.params).most_mm, 6.0 / 4, 1e-4);
+  EXPECT_LT(full.density, 0.99 * 0.4);
+  EXPECT_THROW((void)sized(p, factors, 1.1), Error);  // 1.65 mm next to it is too thick for the cell
+  // What has sizes keeps them, graded or not.
+  EXPECT_EQ(sized({.stick_mm = 0.7, .grade = TcsGrade::Surface}).stick_mm, 0.7);
 }
 
 TEST(Graded, is_thickest_under_the_shell_and_thinnest_deep_inside) {

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 
 #include "fibrolite/ops/fill.h"
 #include "fibrolite/ops/infill/cell_edges.h"
@@ -36,7 +37,7 @@ struct TcsParams {
   double ball_mm = 1.6;     ///< Ball diameter of sticks; stick_mm or more.
   double wall_mm = 0.8;     ///< Thickness of a sheet; 2 voxels or more.
   /// Share of a cell that is material. If given, sticks and balls (which keep their ratio), necks or walls are made as
-  /// thick as that takes.
+  /// thick as that takes; if graded too, in the mean over all that is filled with crystal.
   std::optional<double> density{};
   Vec3d shift_mm{};        ///< Lattice origin, world axes.
   Vec3d rotate_deg{};      ///< Turns about the origin: about world x, then y, then z.
@@ -68,7 +69,18 @@ void each_stick(const TcsParams& params, const Box3d& box, const std::function<v
 /// The same crystal with its sizes instead of a density (which is then none). @throws Error BadRecipe: no sizes give
 /// that density. Cost: tens of milliseconds, if there is a density.
 [[nodiscard]] TcsParams sized(const TcsParams& params);
-/// Thickness of its thinnest and thickest members (stick, neck or wall; balls left out), mm.
+/// Sizes of a graded crystal with a density: members are then `factors` times as thick as these.
+struct GradedSizes {
+  TcsParams params;  ///< With sizes instead of a density.
+  double density;    ///< Mean over the places; params.density within 0.5 %, unless a limit below is in the way.
+};
+/// So that the share of material is params.density in the mean over some places, evenly spread. `factors`: of the field
+/// at those places, at least one, each in [grade_least, grade_most]. No member becomes thinner than `least_mm`, none
+/// thicker than its cell allows (cell_per_member()). @throws Error BadRecipe: both limits cannot hold; as sized().
+/// Cost: tens of milliseconds.
+[[nodiscard]] GradedSizes sized(const TcsParams& params, std::span<const float> factors, double least_mm);
+/// Thickness of its thinnest and thickest members (stick, neck or wall; balls left out), mm. Graded, but with its
+/// density yet to be met: of the crystal not graded.
 struct MemberRange {
   double least_mm, most_mm;
 };
