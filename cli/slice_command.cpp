@@ -109,12 +109,8 @@ int axis_of(Up up) {
 /// Layers from slab after slab: those whose middle lies in it.
 std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, const Context& context) {
   return [stream, context](const SlicePlate& plate, int first) mutable {
-    const SlabPlan& plan = stream.plan();
     const auto slab_of = [&](int layer) {
-      const double middle = (layer + 0.5) * plate.grid.layer_mm;
-      const double at = plate.grid.frame.to_world({0, 0, middle})[plan.axis] / stream.grid().voxel_mm;
-      const auto above = std::upper_bound(plan.borders.begin() + 1, plan.borders.end() - 1, at);
-      return static_cast<std::size_t>(above - plan.borders.begin()) - 1;
+      return stream.slab_at(plate.grid.middle(layer)[stream.plan().axis]);
     };
     const std::size_t slab = slab_of(first);
     int last = first + 1;

@@ -6,8 +6,11 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <limits>
+#include <mutex>
 #include <new>
 #include <optional>
+#include <shared_mutex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -24,10 +27,31 @@ std::string gigabytes(double bytes) { return number_text(bytes / 1e9, 3) + " GB"
 }  // namespace
 
 struct Slicer::Filled {
-  Shape shape;
   SliceGrid grid;
   SliceParams slice;
   Report report;
+  Shape shape;  ///< All of it, or of the slab that was asked for last.
+  // If there are slabs: who asks holds `use` shared, who makes another slab alone.
+  std::optional<SolidStream> stream;
+  std::shared_mutex use;
+  std::size_t slab = std::numeric_limits<std::size_t>::max();
+
+  double cut(int layer, const PixelRange& tile, std::uint8_t* rows, std::ptrdiff_t stride, const Context& context) {
+    if (!stream) return slice_into(rows, stride, tile, shape, grid, layer, slice, context);
+    const std::size_t wanted = stream->slab_at(grid.middle(layer)[stream->plan().axis]);
+    for (;;) {
+      {
+        const std::shared_lock lock(use);
+        if (slab == wanted) return slice_into(rows, stride, tile, shape, grid, layer, slice, context);
+      }
+      const std::unique_lock lock(use);
+      if (slab == wanted) continue;
+      slab = std::numeric_limits<std::size_t>::max();
+      shape = {};  // before the next takes its memory
+      shape = stream->printed(stream->slab(wanted, context), context);
+      slab = wanted;
+    }
+  }
 };
 
 Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context& context) {
@@ -48,11 +72,20 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
   check(params.slice);
   check_recipe(fill.recipe, *fill.voxel_mm, fill.infill);
   if (const double needed = predict(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill).memory_bytes;
-      needed > params.max_memory_bytes)
-    throw Error(
-        Code::TooLarge,
-        "the run would need about " + gigabytes(needed) + " of memory, more than " + gigabytes(params.max_memory_bytes),
-        number_text(*fill.voxel_mm).insert(0, "voxel ") + " mm", "use a larger voxel, or allow more memory");
+      needed > params.max_memory_bytes) {
+    const Vec3d up = direction(params.up);
+    const double margin_mm = 0.5 * params.layer_mm + 4 * *fill.voxel_mm;
+    fill.slabs = plan_slabs(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill,
+                            {.axis = up.x != 0 ? 0 : up.y != 0 ? 1 : 2, .margin_mm = margin_mm}, params.max_memory_bytes);
+    const double least = fill.slabs->memory_bytes;
+    if (least > params.max_memory_bytes || fill.recipe.print.drain_mm.value_or(0) > 0) {
+      throw Error(Code::TooLarge,
+                  "the run would need about " + gigabytes(std::min(least, needed)) + " of memory, more than " +
+                      gigabytes(params.max_memory_bytes),
+                  number_text(*fill.voxel_mm).insert(0, "voxel ") + " mm", "use a larger voxel, or allow more memory");
+    }
+    fill.function = false;
+  }
 
   Report& report = filled->report;
   report.command = "slice";
@@ -62,7 +95,18 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
   report.model.size_mm = bounds(prepared.mesh).size();
   report.model.repairs = prepared.repairs;
   report.warnings = prepared.warnings;
-  filled->shape = hybridize(prepared, fill, report, context.part(0.05, 1, "fill")).printed;
+  Hybrid hybrid = hybridize(prepared, fill, report, context.part(0.05, fill.slabs ? 0.6 : 1, "fill"));
+  filled->shape = std::move(hybrid.printed);
+  filled->stream = std::move(hybrid.stream);
+  if (filled->stream) {
+    // What is reported of the whole takes a look at each.
+    const auto count = static_cast<double>(filled->stream->slabs());
+    for (std::size_t i = 0; i < filled->stream->slabs(); ++i) {
+      const auto n = static_cast<double>(i);
+      (void)filled->stream->slab(i, context.part(0.6 + 0.4 * n / count, 0.6 + 0.4 * (n + 1) / count, "measure"));
+    }
+    filled->stream->finish(report);
+  }
   context.check();
   context.progress(1);
   filled_ = std::move(filled);
@@ -83,7 +127,7 @@ double Slicer::tile(int layer, const PixelRange& tile, std::uint8_t* rows, std::
   if (layer < 0 || layer >= grid().layers)
     throw Error(Code::BadRecipe, "there is no layer " + std::to_string(layer),
                 "layers 0 to " + std::to_string(grid().layers - 1));
-  return slice_into(rows, stride, tile, filled_->shape, grid(), layer, filled_->slice, context);
+  return filled_->cut(layer, tile, rows, stride, context);
 }
 
 }  // namespace fibrolite

@@ -252,6 +252,11 @@ struct SolidStream::Impl {
 
 const SlabPlan& SolidStream::plan() const { return impl_->plan; }
 Grid SolidStream::grid() const { return impl_->grid; }
+std::size_t SolidStream::slab_at(double mm) const {
+  const std::vector<int>& borders = plan().borders;
+  const auto above = std::upper_bound(borders.begin() + 1, borders.end() - 1, mm / grid().voxel_mm);
+  return static_cast<std::size_t>(above - borders.begin()) - 1;
+}
 SolidStream::Slab SolidStream::slab(std::size_t number, const Context& context) { return impl_->slab(number, context); }
 Shape SolidStream::printed(const Slab& slab, const Context& context) const { return impl_->printed(slab, context); }
 void SolidStream::finish(Report& report) const { impl_->finish(report); }

@@ -24,6 +24,8 @@ struct SliceGrid {
   double layer_mm = 0.05;      ///< Height of a layer, mm; > 0.
   int width = 0, height = 0;   ///< Pixels along x and y; 1 or more.
   int layers = 0;
+  /// At half height of a layer, above the frame's origin.
+  [[nodiscard]] Vec3d middle(int layer) const { return frame.to_world({0, 0, (layer + 0.5) * layer_mm}); }
 };
 /// The grid that just holds a box (given in the frame's coordinates) between its bottom and its top; the frame's origin
 /// moves to the box's lower corner.

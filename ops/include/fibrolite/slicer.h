@@ -57,7 +57,8 @@ typedef struct fibrolite_options {
   double pixel_y_mm;       /**< Default: as pixel_x_mm. */
   double layer_mm;         /**< Default 0.05. */
   int planes;              /**< Heights a layer is sampled at, 1 to 16; default 1. */
-  double max_memory_bytes; /**< More than this, by prediction, is refused; default: never. */
+  double max_memory_bytes; /**< A solid that needs more is made slab by slab; ask for its layers in order, for each
+                              change of slab takes as long as making it. Refused if no slab fits. Default: no limit. */
 } fibrolite_options;
 
 /** What an open job holds. Pixel (0, 0) of layer 0 has its lower corner at `origin`; z along `up`. */
@@ -117,10 +118,11 @@ struct SlicerParams {
   Vec2d pixel_mm{0.05, 0.05};
   double layer_mm = 0.05;
   SliceParams slice;
-  double max_memory_bytes = std::numeric_limits<double>::infinity();  ///< A run predicted to need more is refused.
+  /// A solid predicted to need more is made slab by slab, each when a layer in it is asked for; refused if none fits.
+  double max_memory_bytes = std::numeric_limits<double>::infinity();
 };
-/// A filled model, ready for any layer. Immutable, cheap to copy; everything may be called from several threads at
-/// once.
+/// A filled model, ready for any layer. Cheap to copy; everything may be called from several threads at once. In slabs
+/// whoever asks for another slab waits for those at work on this one, so layers are best asked for in order.
 class Slicer {
  public:
   /// Prepares and fills: the same layers as `fibrolite slice` makes of the same numbers.
@@ -139,7 +141,7 @@ class Slicer {
 
  private:
   struct Filled;
-  std::shared_ptr<const Filled> filled_;
+  std::shared_ptr<Filled> filled_;
 };
 
 }  // namespace fibrolite

@@ -43,6 +43,8 @@ class SolidStream {
   [[nodiscard]] const SlabPlan& plan() const;
   [[nodiscard]] Grid grid() const;
   [[nodiscard]] std::size_t slabs() const { return plan().borders.size() - 1; }
+  /// The slab that a place along the plan's axis lies in, mm; the first or last beyond them.
+  [[nodiscard]] std::size_t slab_at(double mm) const;
   struct Slab {
     SampleRange range;
     std::size_t number = 0;
