@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "fibrolite/mesh_io.h"
@@ -315,6 +316,7 @@ void rotations(Table& table) {
       continue;
     }
     const Mesh mesh = prepare(read_mesh(file), {.size_mm = 100, .unit_mm = {}}).mesh;
+    std::optional<std::size_t> columns;  // of the first turn
     for (int turn = 0; turn < 3; ++turn) {
       Random random(1, "rotations", id++);
       const auto unit = [&] { return 2 * random.uniform() - 1; };
@@ -339,9 +341,10 @@ void rotations(Table& table) {
       if (report.is_null()) continue;
       check_printable(table, name, report);
       check_joined(table, name, report);
-      std::printf("     %s: %zu columns in %zu parts, %s necks thickened\n", name.c_str(),
-                  parts_of(report, "column").size(), report["parts"].size(),
-                  report["solid"]["necks_thickened"].dump().c_str());
+      const std::size_t found = parts_of(report, "column").size();
+      table.equal(name + ": columns, as in the first turn", found, columns.value_or(found));
+      columns = columns.value_or(found);
+      std::printf("     %s: %s necks thickened\n", name.c_str(), report["solid"]["necks_thickened"].dump().c_str());
       fs::remove(table.work / (name + ".stl"));  // a hundred megabytes each
     }
   }
