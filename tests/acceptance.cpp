@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What the program must hold on real models: one line per requirement, with the number measured and ok or FAIL. Minutes
-// to run, so not a ctest:  acceptance MODELS_FOLDER [WORK_FOLDER [SECTION...]]
+// to run, so not a ctest:  acceptance MODELS_FOLDER [WORK_FOLDER [SECTION...]]; rotations:MODEL is that model alone
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "fibrolite/mesh_io.h"
@@ -27,6 +28,7 @@ namespace fs = std::filesystem;
 
 struct Table {
   fs::path models, work;
+  std::set<std::string> only{};  ///< Names of models to which `rotations` keeps; all if empty.
   int failed = 0;
 
   void row(const std::string& what, const std::string& measured, bool holds) {
@@ -309,7 +311,12 @@ void rotations(Table& table) {
     files.push_back(asset(name));
   std::uint64_t id = 0;
   for (const fs::path& file : files) {
+    if (!table.only.empty() && !table.only.contains(file.stem())) {
+      id += 3;
+      continue;
+    }
     const Mesh mesh = prepare(read_mesh(file), {.size_mm = 100, .unit_mm = {}}).mesh;
+    std::optional<std::size_t> columns;  // of the first turn
     for (int turn = 0; turn < 3; ++turn) {
       Random random(1, "rotations", id++);
       const auto unit = [&] { return 2 * random.uniform() - 1; };
@@ -334,6 +341,10 @@ void rotations(Table& table) {
       if (report.is_null()) continue;
       check_printable(table, name, report);
       check_joined(table, name, report);
+      const std::size_t found = parts_of(report, "column").size();
+      table.equal(name + ": columns, as in the first turn", found, columns.value_or(found));
+      columns = columns.value_or(found);
+      std::printf("     %s: %s necks thickened\n", name.c_str(), report["solid"]["necks_thickened"].dump().c_str());
       fs::remove(table.work / (name + ".stl"));  // a hundred megabytes each
     }
   }
@@ -424,7 +435,13 @@ int main(int argc, char** argv) {
   }
   Table table{argv[1], argc > 2 ? fs::path(argv[2]) : fs::temp_directory_path() / "fibrolite-acceptance"};
   fs::create_directories(table.work);
-  const std::set<std::string> wanted(argv + std::min(argc, 3), argv + argc);
+  std::set<std::string> wanted;
+  for (int i = 3; i < argc; ++i) {
+    const std::string argument = argv[i];  // SECTION or SECTION:MODEL
+    const auto colon = argument.find(':');
+    wanted.insert(argument.substr(0, colon));
+    if (colon != std::string::npos) table.only.insert(argument.substr(colon + 1));
+  }
   for (const auto& [name, check] : sections)
     if (wanted.empty() || wanted.contains(name)) check(table);
   std::printf("%d requirement%s failed\n", table.failed, table.failed == 1 ? "" : "s");

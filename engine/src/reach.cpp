@@ -187,7 +187,9 @@ class Regrown {
 }  // namespace
 
 double skin_mm(double neck_mm, Grid grid) {
-  return std::clamp(0.5 * neck_mm - grid.voxel_mm, 0.0, (grid.band_vox - 0.5) * grid.voxel_mm);
+  // Samples within half a cube's diagonal of a line make a chain of neighbours along it: those whose cubes it passes.
+  constexpr double half_diagonal = 0.8661;
+  return std::clamp(0.5 * neck_mm - half_diagonal * grid.voxel_mm, 0.0, (grid.band_vox - 0.5) * grid.voxel_mm);
 }
 
 std::vector<Unreached> unreached(const Solid& solid, const Shape& anchor, const ReachParams& params,

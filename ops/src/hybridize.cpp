@@ -12,6 +12,7 @@
 #include "fibrolite/ops/stance.h"
 #include "fibrolite/ops/tie.h"
 #include "fibrolite/ops/trim.h"
+#include "fibrolite/reach.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
@@ -75,6 +76,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   // One composed shape, made into voxels once, in one piece.
   const Grid grid{.voxel_mm = voxel};
   const double shell_mm = recipe.shell.thickness_mm;
+  report.solid.neck_mm = 2 * skin_mm(tie_params(recipe, params.infill, everything(), voxel).neck_mm, grid);
   const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
   if (params.slabs) {
     out.stream = run("pieces", 1.0, [&](const Context& c) {

@@ -68,13 +68,17 @@ void drop_grazes(Layer& layer) {
   }
 }
 
-/// Area of the layer inside the body, mm2. Pixels on an edge count in part, so that the raster's place does not matter.
-double area_mm2(const Layer& layer, const FloatImage& depth, const FloatImage& rim) {
+/// Area inside the body of what is negative, mm2. Pixels on an edge count in part, so that the raster's place does not
+/// matter.
+double area_mm2(const FloatImage& distance_mm, const FloatImage& depth, const FloatImage& rim, double pixel_mm) {
   double pixels = 0;
   for (std::size_t i = 0; i < rim.pixels.size(); ++i)
-    if (rim.pixels[i] < -(rim_px - 1.5) * layer.pixel_mm)  // the section and the pixels around it
-      pixels += coverage(layer.distance_mm.pixels[i], layer.pixel_mm) * coverage(depth.pixels[i], layer.pixel_mm);
-  return pixels * layer.pixel_mm * layer.pixel_mm;
+    if (rim.pixels[i] < -(rim_px - 1.5) * pixel_mm)  // the section and the pixels around it
+      pixels += coverage(distance_mm.pixels[i], pixel_mm) * coverage(depth.pixels[i], pixel_mm);
+  return pixels * pixel_mm * pixel_mm;
+}
+double area_mm2(const Layer& layer, const FloatImage& depth, const FloatImage& rim) {
+  return area_mm2(layer.distance_mm, depth, rim, layer.pixel_mm);
 }
 
 }  // namespace
@@ -93,13 +97,15 @@ Layer transient_layer(const Interface& interface, const Shape& fill_a, const Sha
   layer.pixel_mm = pixel_mm;
   layer.solid = Image<std::uint8_t>(grid.width, grid.height);
   layer.distance_mm = FloatImage(grid.width, grid.height);
+  FloatImage ring(grid.width, grid.height);
   for (std::size_t i = 0; i < section.pixels.size(); ++i) {
     // Outside the body the shell's ring goes on to the rim; assemble() clips it.
-    const float ring = -(depth.pixels[i] + static_cast<float>(shell_mm));
-    const float joined = std::min({a.pixels[i], b.pixels[i], ring});
+    ring.pixels[i] = -(depth.pixels[i] + static_cast<float>(shell_mm));
+    const float joined = std::min({a.pixels[i], b.pixels[i], ring.pixels[i]});
     layer.distance_mm.pixels[i] = joined;
     layer.solid.pixels[i] = section.pixels[i] != 0 && joined < 0;
   }
+  layer.shell_area_mm2 = area_mm2(ring, depth, rim, pixel_mm);
   drop_grazes(layer);
   layer.regions_before = regions(layer);
   layer.union_area_mm2 = area_mm2(layer, depth, rim);

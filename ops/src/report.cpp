@@ -90,6 +90,8 @@ Json to_json(const InterfaceReport& interface) {
           {"bridge_area_mm2", interface.bridge_area_mm2},
           {"bridge_mm3", {{"mst", interface.mst_bridge_mm3}, {"bbox", interface.bbox_bridge_mm3}}},
           {"contact_area_mm2", interface.contact_area_mm2},
+          {"shell_area_mm2", interface.shell_area_mm2},
+          {"demand_n", interface.demand_n},
           {"capacity_over_demand", interface.capacity_over_demand}};
 }
 
@@ -105,6 +107,7 @@ Json to_json(const SolidReport& solid) {
           {"voids_filled", solid.voids_filled},
           {"dangling", solid.dangling},
           {"unreached", solid.unreached},
+          {"neck_mm", solid.neck_mm},
           {"necks_thickened", solid.necks_thickened},
           {"tips_tied", solid.tips_tied},
           {"tips_removed", solid.tips_removed},

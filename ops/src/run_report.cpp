@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fibrolite/ops/text.h"
 #include "fibrolite/pieces.h"
 #include "run.h"
 
@@ -11,6 +12,21 @@ namespace {
 
 void append(std::vector<std::string>& to, const std::vector<std::string>& from) {
   to.insert(to.end(), from.begin(), from.end());
+}
+
+std::string too_weak(const InterfaceReport& joint, double yield_mpa) {
+  const double solid = joint.area_mm2 * yield_mpa / joint.demand_n;
+  return std::string("the joint between parts ")
+      .append(std::to_string(joint.a))
+      .append(" and ")
+      .append(std::to_string(joint.b))
+      .append(" can carry only ")
+      .append(number_text(joint.capacity_over_demand, 2))
+      .append(" of what the load puts through it")
+      .append(solid < 1 ? ", and solid no more than " + number_text(solid, 2) +
+                              ": check the load (verify.load_n, loads), --up and --size"
+                        : std::string(": raise shell.thickness_mm or tcs.density, lower joint.spacing_mm, or keep the "
+                                      "place solid (partition.overrides)"));
 }
 
 }  // namespace
@@ -74,10 +90,12 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
         joint.layer.pixel_mm * joint.layer.pixel_mm *
         static_cast<double>(std::count(joint.layer.solid.pixels.begin(), joint.layer.solid.pixels.end(), 1));
     row.contact_area_mm2 = joint.contact_area_mm2;
-    row.capacity_over_demand =
-        joint.contact_area_mm2 * recipe.material.yield_mpa / demand_n[i];  // no demand: infinite, null
+    row.shell_area_mm2 = joint.layer.shell_area_mm2;
+    row.demand_n = demand_n[i];
+    row.capacity_over_demand = (row.contact_area_mm2 + row.shell_area_mm2) * recipe.material.yield_mpa / row.demand_n;
     report.interfaces.push_back(row);
     append(report.warnings, joint.warnings);
+    if (row.capacity_over_demand < 1) report.warnings.push_back(too_weak(row, recipe.material.yield_mpa));
   }
 }
 

@@ -125,17 +125,20 @@ Joint sleeve(const Interface& mantle, const Shape& fill_a, const Shape& fill_b, 
   layer.solid = Image<std::uint8_t>(around.width, around.height);
   layer.distance_mm = FloatImage(around.width, around.height);
   Image<std::uint8_t> before(around.width, around.height), touching(around.width, around.height);
+  Image<std::uint8_t> ring(around.width, around.height);
   const auto shell = static_cast<float>(shell_mm);
   for (std::size_t i = 0; i < layer.solid.pixels.size(); ++i) {
     const bool inside = depth.pixels[i] <= 0 && parts.pixels[i] < 0;
     layer.solid.pixels[i] = inside ? 1 : 0;
     layer.distance_mm.pixels[i] = std::max(depth.pixels[i], parts.pixels[i]);
     before.pixels[i] = inside && std::min({a.pixels[i], b.pixels[i], -(depth.pixels[i] + shell)}) < 0 ? 1 : 0;
+    ring.pixels[i] = inside && depth.pixels[i] >= -shell ? 1 : 0;
     touching.pixels[i] = inside && depth_outside.pixels[i] < -shell && outside.pixels[i] < 0 ? 1 : 0;
   }
   layer.regions_before = regions_around(before);
   layer.regions_after = regions_around(layer.solid);
   layer.union_area_mm2 = area_of(before, around.pixel_mm2());
+  layer.shell_area_mm2 = area_of(ring, around.pixel_mm2());
   layer.bridge_area_mm2 = std::max(0.0, area_of(layer.solid, around.pixel_mm2()) - layer.union_area_mm2);
   joint.contact_area_mm2 = area_of(touching, around.pixel_mm2());
   const Shape tube =

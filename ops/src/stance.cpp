@@ -2,7 +2,10 @@
 #include "fibrolite/ops/stance.h"
 
 #include <cmath>
+#include <numbers>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "fibrolite/error.h"
 #include "load.h"
@@ -25,6 +28,35 @@ Frame placed(const Frame& f, const Frame& frame) {
   return {frame.to_world(f.origin), turned(frame, f.x), turned(frame, f.y), turned(frame, f.z)};
 }
 
+constexpr double least_sine = 0.05;  // directions nearer to parallel say nothing of each other's side
+
+/// Where the forces that decide go, one by one: unit vectors. Pressures have none.
+std::vector<Vec3d> directions(const VerifyParams& params) {
+  const Vec3d up = normalized(params.up);
+  const auto resolved = [&](const Direction& d) {
+    switch (d.of) {
+      case Direction::Of::World:
+        break;
+      case Direction::Of::Up:
+        return up;
+      case Direction::Of::Down:
+        return -up;
+      case Direction::Of::Slanted:
+        return load_directions(up, params.azimuth_deg)[1];
+    }
+    return normalized(d.vector);
+  };
+  std::vector<Vec3d> found;
+  for (const LoadCase& one : params.loads) {
+    if (one.unplanned) continue;
+    for (const Force& force : one.forces) {
+      if (const auto* total = std::get_if<TotalForce>(&force)) found.push_back(resolved(total->direction));
+      if (const auto* weight = std::get_if<Gravity>(&force)) found.push_back(resolved(weight->direction));
+    }
+  }
+  return found;
+}
+
 template <class Map>
 Box3d mapped(const Box3d& box, Map&& map) {
   Box3d result;
@@ -37,15 +69,28 @@ Box3d mapped(const Box3d& box, Map&& map) {
 Frame stance(const VerifyParams& params) {
   if (!(norm(params.up) > 0) || !std::isfinite(norm(params.up)) || !std::isfinite(params.azimuth_deg))
     throw Error(Code::BadRecipe, "up must be a direction and azimuth_deg a number", "verify");
-  const Vec3d up = tidy(normalized(params.up)), from = tidy(slanted_from(up, params.azimuth_deg));
-  return {{}, from, cross(up, from), up};
+  const Vec3d up = normalized(params.up);
+  const std::vector<Vec3d> along = directions(params);
+  const Vec3d z = tidy(along.empty() ? up : -along.front());
+  Vec3d from = slanted_from(z, params.azimuth_deg);
+  for (const Vec3d d : along)
+    if (const Vec3d level = dot(d, z) * z - d; norm(level) > least_sine) {
+      from = normalized(level);
+      break;
+    }
+  from = tidy(from);
+  return {{}, from, cross(z, from), z};
 }
 
 VerifyParams in_stance(const VerifyParams& params) {
   const Frame frame = stance(params);
   VerifyParams standing = params;
-  standing.up = {0, 0, 1};
-  standing.azimuth_deg = 0;
+  const auto local = [&](Vec3d d) { return tidy(frame.to_local(d)); };
+  const Vec3d up = normalized(params.up);
+  standing.up = local(up);
+  const Vec3d from = local(slanted_from(up, params.azimuth_deg));
+  const Vec3d zero = slanted_from(standing.up, 0);
+  standing.azimuth_deg = std::atan2(dot(from, cross(standing.up, zero)), dot(from, zero)) * 180 / std::numbers::pi;
   standing.loads = in_frame(frame, params.loads);
   if (params.load_box_mm)
     standing.load_box_mm = mapped(*params.load_box_mm, [&](Vec3d p) { return frame.to_local(p); });

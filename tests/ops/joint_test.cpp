@@ -51,6 +51,7 @@ TEST(Layer, UnionOfTwoPatternsAndTheShellHasTheAreaOfPaper) {
   EXPECT_EQ(layer.regions_before, 1);
   EXPECT_EQ(layer.regions_after, 1);
   EXPECT_EQ(layer.bridge_area_mm2, 0);
+  EXPECT_NEAR(layer.shell_area_mm2, pi * (100 - 81), 0.005 * pi * (100 - 81));
 }
 
 TEST(Layer, BridgesFollowTheShortestGaps) {

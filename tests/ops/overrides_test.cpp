@@ -109,6 +109,43 @@ TEST(Overrides, ACutPartsABarWhereItIsGiven) {
             std::string::npos);
 }
 
+/// A bar of 20 x 20 mm pressed along its length: its cut carries the force itself, by the shell's ring and by the
+/// crystal.
+TEST(Overrides, TheJointOfACutSaysWhatItCarriesAndIsNamedIfThatIsTooLittle) {
+  const auto pressed = [](double force_n) {
+    Recipe recipe = sturdy();
+    recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};
+    const std::string loads = R"({"loads": [{"name": "pressed", "supports": [{"where": {"lowest": {"share": 0.05,
+        "along": [1, 0, 0]}}}], "forces": [{"force_n": )" +
+                              std::to_string(force_n) +
+                              R"(, "direction": [-1, 0, 0], "where": {"seen_from": [1, 0, 0]}}]}]})";
+    recipe = parse_recipe(loads, recipe, "test");
+    recipe.print.check = false;
+    return hybridized(block({40, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5}).report;
+  };
+  const auto warned = [](const Report& report, const std::string& what_to_try) {
+    return std::count_if(report.warnings.begin(), report.warnings.end(), [&](const std::string& w) {
+      return w.find("joint between parts 0 and 1 can carry only 0.") != std::string::npos &&
+             w.find(what_to_try) != std::string::npos;
+    });
+  };
+  const Report light = pressed(2000), heavy = pressed(15000);
+  ASSERT_EQ(light.interfaces.size(), 1U);
+  const InterfaceReport& joint = light.interfaces[0];
+  const double inner = 20 - 2 * sturdy().shell.thickness_mm, ring = 400 - inner * inner;
+  EXPECT_NEAR(joint.shell_area_mm2, ring, 0.02 * ring);
+  EXPECT_NEAR(joint.demand_n, 2000, 0.03 * 2000);
+  const double carried = 50 * (joint.shell_area_mm2 + joint.contact_area_mm2);  // of PLA
+  EXPECT_NEAR(joint.capacity_over_demand, carried / joint.demand_n, 1e-9);
+  EXPECT_GT(joint.capacity_over_demand, 1);
+  EXPECT_EQ(warned(light, ""), 0);
+  EXPECT_NEAR(heavy.interfaces.at(0).capacity_over_demand, 2.0 / 15 * joint.capacity_over_demand, 1e-3);
+  EXPECT_LT(heavy.interfaces.at(0).capacity_over_demand, 1);
+  EXPECT_EQ(warned(heavy, "raise shell.thickness_mm"), 1);
+  // What is more than a solid bar can carry is no matter of the joint.
+  EXPECT_EQ(warned(pressed(40000), ", and solid no more than 0."), 1);
+}
+
 TEST(Overrides, APartGetsTheInfillItIsGiven) {
   Recipe recipe = sturdy();
   recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}}};

@@ -63,10 +63,11 @@ TEST(Report, HasEveryKeyOfSchemaOne) {
                           "diameter_mm", "mean_stress_mpa", "dominance", "reason"})
     EXPECT_TRUE(report.at("parts").at(0).contains(key)) << key;
   for (const char* key : {"parts", "centroid_mm", "normal", "border", "area_mm2", "regions_before", "regions_after",
-                          "columns", "contact_area_mm2", "capacity_over_demand"})
+                          "columns", "contact_area_mm2", "shell_area_mm2", "demand_n", "capacity_over_demand"})
     EXPECT_TRUE(report.at("interfaces").at(0).contains(key)) << key;
-  for (const char* key : {"volume_mm3", "fill_ratio", "mass_g", "pieces", "cavities", "cavity_volume_mm3", "dangling",
-                          "unreached", "necks_thickened", "tips_tied", "tips_removed", "active_voxels", "voxel_mm"})
+  for (const char* key :
+       {"volume_mm3", "fill_ratio", "mass_g", "pieces", "cavities", "cavity_volume_mm3", "dangling", "unreached",
+        "neck_mm", "necks_thickened", "tips_tied", "tips_removed", "active_voxels", "voxel_mm"})
     EXPECT_TRUE(report.at("solid").contains(key)) << key;
   for (const char* key : {"volume_mm3", "triangles", "vertices", "boundary_edges", "nonmanifold_edges",
                           "nonmanifold_vertices", "degenerate_triangles", "shells"})

@@ -71,6 +71,7 @@ TEST(Sleeve, joins_what_ends_on_it_and_says_where_it_touches) {
   EXPECT_EQ(joint.layer.regions_after, 1);
   const double touched = 2 * pi * radius * 6 * 2;
   EXPECT_NEAR(joint.contact_area_mm2, touched, 0.02 * touched);
+  EXPECT_NEAR(joint.layer.shell_area_mm2, 2 * pi * radius * 2 * shell, 2 * pi * radius * pixel);  // either end
   EXPECT_TRUE(joint.warnings.empty());
   // Half planes through the axis: strips all along, joined at both ends by the shell.
   const Joint strips = m.joint(cuboid({{-20, 1.8, -5}, {20, 2.2, 35}}), crystal);

@@ -18,16 +18,17 @@ struct ReachParams {
   Shape keep_out = nothing();  ///< What a way keeps half a neck away from.
 };
 struct Unreached {
-  Piece piece;  ///< Without its skin: half a neck less one voxel.
+  Piece piece;  ///< Without its skin, skin_mm() thick.
   std::optional<Gap>
       way{};  ///< To the nearest reached material: through the neck if one leads there, else through void.
 };
-/// How deep the skin is that is taken off, mm: a member as wide as the neck keeps a chain of neighbouring samples that
-/// deep, however it lies on the lattice.
+/// How deep the skin is that is taken off, mm: half a neck less half the diagonal of a voxel, 0.87 of its edge. It is
+/// the deepest for which a member as wide as the neck keeps a chain of neighbouring samples, however it lies on the
+/// lattice.
 [[nodiscard]] double skin_mm(double neck_mm, Grid grid);
 /// Material that hangs on `anchor` (where that is negative) only through necks clearly thinner than neck_mm, largest
-/// first: the pieces that taking half a neck less one voxel off the surface cuts off. So a neck is found if it is
-/// thinner than neck_mm - 2 voxels, and never if it is neck_mm thick. Values of a union understate depth: what they
+/// first: the pieces that taking skin_mm() off the surface cuts off. So a neck is found if it is thinner than
+/// neck_mm - 1.74 voxels, and never if it is neck_mm thick. Values of a union understate depth: what they
 /// find is measured again, from the surface itself, only there. A capsule of neck_mm along every way makes all reached.
 /// Cost: as pieces(), and O((neck / voxel)^3) per sample of what the values found. The same answer on any number of
 /// threads.

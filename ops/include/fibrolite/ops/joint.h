@@ -35,6 +35,7 @@ struct Layer {
   double pixel_mm = 0.1;
   int regions_before = 0, regions_after = 0;
   double union_area_mm2 = 0, bridge_area_mm2 = 0;
+  double shell_area_mm2 = 0;         ///< Of the shell's ring, which runs on through the section.
   double other_bridge_area_mm2 = 0;  ///< What the rule that was not used would have taken.
 };
 /// Number of connected (8-neighbour) material regions of a layer: the connectivity check. A joint is sound iff this

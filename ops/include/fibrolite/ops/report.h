@@ -35,7 +35,9 @@ struct InterfaceReport {
   int regions_before = 0, regions_after = 0, columns = 0, columns_dropped = 0;
   double layer_area_mm2 = 0, union_area_mm2 = 0, bridge_area_mm2 = 0, contact_area_mm2 = 0;
   double mst_bridge_mm3 = 0, bbox_bridge_mm3 = 0;  ///< Material of the bridges by either rule, whichever was used.
-  double capacity_over_demand = 0;  ///< contact_area * yield / integral of the traction in the worst load case.
+  double shell_area_mm2 = 0;                       ///< Of the shell, which runs on through the section.
+  double demand_n = 0;  ///< Integral over the section of the traction, everywhere of the load case that has most.
+  double capacity_over_demand = 0;  ///< (contact_area + shell_area) * yield / demand; infinite without a demand.
 };
 struct SolidReport {
   double volume_mm3 = 0, fill_ratio = 0, mass_g = 0;
@@ -48,7 +50,8 @@ struct SolidReport {
   std::int64_t voids_filled = 0;                 ///< Micro-voids.
   std::int64_t dangling = 0;  ///< Sticks that end in the void; membranes that do, in the middle section of a column.
   std::int64_t unreached =
-      0;  ///< Material that hangs on the shell only through necks thinner than the thinnest member.
+      0;               ///< Material that hangs on the shell only through necks thinner than the thinnest member.
+  double neck_mm = 0;  ///< Thinner necks than this were looked for; 0 where nothing has a thickness.
   std::int64_t active_voxels = 0;
   double voxel_mm = 0;
 };
