@@ -109,9 +109,7 @@ int axis_of(Up up) {
 /// Layers from slab after slab: those whose middle lies in it.
 std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, const Context& context) {
   return [stream, context](const SlicePlate& plate, int first) mutable {
-    const auto slab_of = [&](int layer) {
-      return stream.slab_at(plate.grid.middle(layer)[stream.plan().axis]);
-    };
+    const auto slab_of = [&](int layer) { return stream.slab_at(plate.grid.middle(layer)[stream.plan().axis]); };
     const std::size_t slab = slab_of(first);
     int last = first + 1;
     while (last < plate.grid.layers && slab_of(last) == slab) ++last;

@@ -76,7 +76,11 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
     const Vec3d up = direction(params.up);
     const double margin_mm = 0.5 * params.layer_mm + 4 * *fill.voxel_mm;
     fill.slabs = plan_slabs(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill,
-                            {.axis = up.x != 0 ? 0 : up.y != 0 ? 1 : 2, .margin_mm = margin_mm}, params.max_memory_bytes);
+                            {.axis = up.x != 0   ? 0
+                                     : up.y != 0 ? 1
+                                                 : 2,
+                             .margin_mm = margin_mm},
+                            params.max_memory_bytes);
     const double least = fill.slabs->memory_bytes;
     if (least > params.max_memory_bytes || fill.recipe.print.drain_mm.value_or(0) > 0) {
       throw Error(Code::TooLarge,

@@ -263,6 +263,39 @@ TEST(Slicer, CancelEndsSlicingToo) {
   EXPECT_EQ(fibrolite_job_tile(job.get(), 0, 0, 0, 1, 1, &pixel, 1, nullptr), FIBROLITE_CANCELLED);
 }
 
+TEST(Slicer, WithLessMemoryThePixelsAreTheSameSlabBySlab) {
+  const Mesh molar = read_mesh(testing::asset("molar")).mesh;
+  SlicerParams params;
+  params.fill.infill = InfillKind::Tcs;
+  params.fill.voxel_mm = 0.3;
+  params.pixel_mm = {0.4, 0.4};
+  params.layer_mm = 0.5;
+  const MeshFile model{.mesh = molar, .unit_mm = 1, .notes = {}};
+  const Slicer whole(model, params);
+  params.max_memory_bytes = 85e6;
+  ASSERT_GT(predict(molar, 0.3, params.fill.recipe, InfillKind::Tcs).memory_bytes, params.max_memory_bytes);
+  const Slicer slabs(model, params);
+  ASSERT_EQ(slabs.grid().layers, whole.grid().layers);
+  EXPECT_EQ(slabs.report().solid.volume_mm3, whole.report().solid.volume_mm3);
+  EXPECT_EQ(slabs.report().solid.pieces, 1);
+  // Out of order, and two at once that may be of different slabs.
+  const int layers = whole.grid().layers;
+  std::vector<GrayImage> first(10), second(10);
+  const auto ask = [&](std::vector<GrayImage>& into, int from) {
+    for (std::size_t i = 0; i < into.size(); ++i)
+      into[i] = slabs.layer((from + 37 * static_cast<int>(i)) % layers).coverage;
+  };
+  std::thread other([&] { ask(second, layers / 2); });
+  ask(first, 0);
+  other.join();
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(first[i].pixels, whole.layer(37 * static_cast<int>(i) % layers).coverage.pixels) << i;
+    EXPECT_EQ(second[i].pixels, whole.layer((layers / 2 + 37 * static_cast<int>(i)) % layers).coverage.pixels) << i;
+  }
+  params.max_memory_bytes = 60e6;
+  EXPECT_THROW((void)Slicer(model, params), Error);
+}
+
 TEST(Slicer, InCppThePixelsAreTheSame) {
   SlicerParams params;
   params.fill.recipe = parse_recipe(quick().recipe, {}, "test");
