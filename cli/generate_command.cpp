@@ -13,6 +13,7 @@
 #include "fibrolite/surface.h"
 #include "job.h"
 #include "options.h"
+#include "run.h"
 #include "summary.h"
 #include "views.h"
 
@@ -60,6 +61,9 @@ double expected_bytes(const fs::path& file, const Prediction& expected) {
   return triangle * expected.triangles;
 }
 
+/// How much less it takes on some threads than on one.
+double shared_among(int threads) { return 1 + 0.65 * (threads - 1); }
+
 std::string plan(const GenerateOptions& options, const Model& model, const HybridizeParams& params) {
   const Vec3d size = bounds(model.mesh).size();
   std::string text = "model     " + options.model.path.string() + ", " + std::to_string(model.mesh.triangles.size()) +
@@ -74,6 +78,9 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
   text += memory_text(options.run.allowed_bytes());
   if (params.slabs) text += ", in " + std::to_string(params.slabs->borders.size() - 1) + " slabs";
   text += "\n";
+  const double cpu_s = machine_times() * (expected.cpu_s + (params.slabs ? expected.slabs_s : 0));
+  text += "time      about " + number_text(cpu_s / shared_among(ThreadLimit::count()), 2) + " s, " +
+          number_text(cpu_s, 2) + " s of CPU, and what the disk takes\n";
   for (const fs::path& file : options.output.files)
     text += "output    " + file.string() + ", about " + memory_text(expected_bytes(file, expected)) + "\n";
   text += "output    " + options.output.report_path().string() + "\n";

@@ -2,6 +2,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -210,30 +211,30 @@ class Checker {
     triangles_.resize(kept);
   }
 
-  // Lists the corners at each vertex to visit (a counting sort). The order within a list depends on the threads;
-  // nothing counted does.
+  // Lists the corners at each vertex to visit (a counting sort). Each thread goes through all triangles for its share
+  // of the vertices: that is less than what it costs to share the counters.
   void collect_corners() {
-    starts_.assign(end_ - first_ + 1, 0);
+    const std::size_t vertices = end_ - first_,
+                      shares = std::clamp<std::size_t>(
+                          static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()), 1, 8);
+    starts_.assign(vertices + 1, 0);
     const auto for_corners = [&](const auto& use) {
-      tbb::parallel_for(Range(0, triangles_.size(), 4096), [&](const Range& range) {
-        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+      tbb::parallel_for(std::size_t{0}, shares, [&](std::size_t share) {
+        const std::size_t low = first_ + share * vertices / shares, high = first_ + (share + 1) * vertices / shares;
+        for (std::size_t t = 0; t < triangles_.size(); ++t) {
           for (std::uint32_t i = 0; i < 3; ++i) {
             const std::uint32_t v = triangles_[t].corners[i];
-            if (v >= first_ && v < end_)
-              use(std::atomic_ref(starts_[v - first_]), 3 * static_cast<std::uint32_t>(t) + i);
+            if (v - low < high - low) use(starts_[v - first_], 3 * static_cast<std::uint32_t>(t) + i);
           }
         }
       });
     };
-    for_corners(
-        [](std::atomic_ref<std::uint32_t> start, std::uint32_t) { start.fetch_add(1, std::memory_order_relaxed); });
+    for_corners([](std::uint32_t& start, std::uint32_t) { ++start; });
     // Ends first; filling backwards turns them into beginnings.
     std::uint32_t sum = 0;
     for (std::uint32_t& start : starts_) start = sum += start;
     corners_.resize(sum);
-    for_corners([&](std::atomic_ref<std::uint32_t> start, std::uint32_t corner) {
-      corners_[start.fetch_sub(1, std::memory_order_relaxed) - 1] = corner;
-    });
+    for_corners([&](std::uint32_t& start, std::uint32_t corner) { corners_[--start] = corner; });
   }
 
   /// Nearly every vertex: its triangles follow each other around it once, each edge in both directions. Joins them and

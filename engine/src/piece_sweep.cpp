@@ -2,9 +2,12 @@
 #include "fibrolite/piece_sweep.h"
 
 #include <openvdb/openvdb.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -104,8 +107,10 @@ struct PieceSweep::Impl {
     return face;
   }
 
-  void add(const Solid& solid, const SampleRange& range, const Shape& anchor, const Context& context) {
-    const Components components(solid, context, static_cast<float>(params.below), &range);
+  [[nodiscard]] Components components_of(const Solid& solid, const SampleRange& range, const Context& context) const {
+    return {solid, context, static_cast<float>(params.below), &range};
+  }
+  void add(const Components& components, const SampleRange& range, const Shape& anchor) {
     std::map<std::pair<int, int>, Face> next;
     if (!components.empty()) take(components, range, anchor, next);
     // What the slab before left open, against this one's first layer or the exterior.
@@ -277,7 +282,24 @@ struct PieceSweep::Impl {
 PieceSweep::PieceSweep(Grid grid, const Params& params) : impl_(std::make_shared<Impl>(grid, params)) {}
 
 void PieceSweep::add(const Solid& solid, int low, int high, const Shape& anchor, const Context& context) {
-  impl_->add(solid, {impl_->params.axis, low, high}, anchor, context);
+  const SampleRange range{impl_->params.axis, low, high};
+  impl_->add(impl_->components_of(solid, range, context), range, anchor);
+}
+
+void PieceSweep::add(const Solid& solid, const std::vector<SampleRange>& ranges, const Context& context) {
+  // Joining labels runs on one thread, but for each range on its own.
+  const auto at_once = static_cast<std::size_t>(std::max(tbb::this_task_arena::max_concurrency(), 1));
+  for (std::size_t from = 0; from < ranges.size(); from += at_once) {
+    context.check();
+    std::vector<std::optional<Components>> found(std::min(at_once, ranges.size() - from));
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
+      found[i].emplace(impl_->components_of(solid, ranges[from + i], context.part(0, 0, "")));
+    });
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      impl_->add(*found[i], ranges[from + i], nothing());
+      found[i].reset();
+    }
+  }
 }
 
 PieceSweep::Result PieceSweep::finish() { return impl_->finish(); }

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a run will need, known before it starts.
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "fibrolite/ops/hybridize.h"
+#include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/solid_stream.h"
 
 namespace fibrolite {
@@ -137,7 +140,32 @@ Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, Inf
   // The body is gone when the surface is made, which takes twenty bytes a triangle.
   const double voxels = body_times * body + solid_times * solid, mesh = solid + 20 * result.triangles;
   result.memory_bytes = fixed_bytes(model) + std::max({safety * voxels, safety * mesh, deciding_bytes(infill)});
+  // Measured on one thread: of the body per sample; of the solid per voxel of the band; of the mesh per triangle.
+  const double deciding_s = infill == InfillKind::Hybrid ? 14 : 0, body_s = 46e-9 * body / bytes_a_sample;
+  const double solid_s = (recipe.print.check ? 145e-9 : 105e-9) * result.active_voxels;
+  const double model_s = 0.2 + 5e-6 * static_cast<double>(model.triangles.size());
+  result.cpu_s = model_s + deciding_s + body_s + solid_s + 245e-9 * result.triangles;
+  result.slabs_s = model_s + body_s + 0.8 * solid_s;
   return result;
+}
+
+double machine_times() {
+  constexpr double there_s = 6.7e-6;  // a block
+  const Shape sticks = crystal(sized(TcsParams{}));
+  std::array<float, PointBlock::capacity> x, y, z, out;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    x[i] = 0.25F * static_cast<float>(i / 64);
+    y[i] = 0.25F * static_cast<float>(i / 8 % 8);
+    z[i] = 0.25F * static_cast<float>(i % 8);
+  }
+  double best_s = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 8; ++round) {
+    constexpr int blocks = 64;
+    const auto start = std::chrono::steady_clock::now();
+    for (int i = 0; i < blocks; ++i) sticks.evaluate({x.data(), y.data(), z.data(), PointBlock::capacity}, out.data());
+    best_s = std::min(best_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / blocks);
+  }
+  return best_s / there_s;
 }
 
 SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const SlabNeeds& needs,

@@ -152,6 +152,24 @@ TEST(Generate, LessMemoryGivesTheSameFilesSlabBySlab) {
   EXPECT_EQ(names_in(slabs.path()).size(), 6U);  // nothing stays behind
 }
 
+TEST(Generate, ADryRunSaysWhatTheRunWillTake) {
+  const auto said = [](const std::string& voxel, const std::string& unit) {
+    const TempDir folder;
+    const Finished finished =
+        run({"generate", asset("molar"), "--infill", "tcs", "--voxel", voxel, "-o", folder / "a.stl", "--dry-run"});
+    const std::size_t at = finished.out.find("time      about ");
+    EXPECT_NE(at, std::string::npos) << finished.out;
+    EXPECT_THAT(names_in(folder.path()), IsEmpty());
+    const std::size_t end = finished.out.find(unit, at);
+    const std::size_t begin = finished.out.rfind(' ', end - 1);
+    return std::stod(finished.out.substr(begin, end - begin));
+  };
+  // Four times the voxels and triangles; the machine is asked anew each time.
+  const double once = said("0.2", " s of CPU"), four_times = said("0.1", " s of CPU");
+  EXPECT_GT(four_times, 2 * once);
+  EXPECT_LT(four_times, 10 * once);
+}
+
 TEST(Generate, WhatNeedsTheWholeSolidIsRefusedIfItDoesNotFit) {
   const TempDir folder;
   const auto refused = [&](const std::string& output, const std::vector<std::string>& more) {

@@ -23,7 +23,7 @@ struct Flips {
   std::vector<Block> blocks;  ///< Sorted by origin, x first; each once.
 };
 /// The solid with those of the samples that it holds turned over. Cost: a copy of the solid, if there is any flip in
-/// it.
+/// it and something else holds it too.
 [[nodiscard]] Solid flipped(Solid solid, const Flips& flips);
 
 class PieceSweep {
@@ -39,6 +39,8 @@ class PieceSweep {
   /// before. What `solid` holds beyond is not looked at. Pieces with a sample where `anchor` is negative are
   /// held. Cost: as pieces(), plus the slab's last layer of samples in memory.
   void add(const Solid& solid, int low, int high, const Shape& anchor = nothing(), const Context& context = {});
+  /// The next slabs, without an anchor, as many at once as there are threads.
+  void add(const Solid& solid, const std::vector<SampleRange>& ranges, const Context& context = {});
 
   struct Result {
     /// But for specks that go and voids that are filled; the same, however the solid was cut. A void that is filled may

@@ -64,7 +64,11 @@ struct Hybrid {
 struct Prediction {
   double memory_bytes = 0;  ///< At its highest.
   double active_voxels = 0, triangles = 0;
+  double cpu_s = 0;    ///< Until the mesh is checked, on the machine the fits were made on.
+  double slabs_s = 0;  ///< What slabs add to it.
 };
+/// How many times as long this machine takes as that one, for the crystal at some points. Takes a few milliseconds.
+[[nodiscard]] double machine_times();
 [[nodiscard]] Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill);
 
 }  // namespace fibrolite
