@@ -48,18 +48,18 @@ void KeepVolume::process(bool all, const Use& use) {
   } else {
     summed_ = settled_ = looked_ = moved_ = count;
   }
-  std::vector<std::array<double, 4>> volumes(moved_ - split_);
-  tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t i) { volumes[i] = split(split_ + i); });
+  std::vector<std::array<double, 4>> volumes(moved_ - measured_);
+  tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t i) { volumes[i] = volume_of(measured_ + i); });
   for (const auto& v : volumes)
     for (std::size_t k = 0; k < 4; ++k) volume_[k] += v[k];
-  split_ = moved_;
+  measured_ = moved_;
 
-  const std::size_t done = but(split_, 1);  // the last is looked at from above
+  const std::size_t done = but(measured_, 1);  // the last is looked at from above
   for (std::size_t n = 0; n < done; ++n) {
     use(std::move(window_.front().layer));
     window_.pop_front();
   }
-  for (std::size_t* progress : {&summed_, &settled_, &looked_, &moved_, &split_}) *progress -= done;
+  for (std::size_t* progress : {&summed_, &settled_, &looked_, &moved_, &measured_}) *progress -= done;
 }
 
 /// Edge vectors and normals of a layer's quads, at their vertices.
@@ -144,13 +144,13 @@ void KeepVolume::choose_moves(std::size_t n) {
   work.mine = {};
 }
 
-/// Turns the quads for their diagonals, the shorter ones after a whole move; returns what they add to the volume.
-std::array<double, 4> KeepVolume::split(std::size_t n) {
-  MovableLayer& layer = window_[n].layer;
+/// What the quads add to the volume, each along its diagonal that is shorter after a whole move.
+std::array<double, 4> KeepVolume::volume_of(std::size_t n) const {
+  const MovableLayer& layer = window_[n].layer;
   const MovableLayer* below = n > 0 ? &window_[n - 1].layer : nullptr;
   const auto unit = static_cast<double>(move_unit(voxel_mm_));
   std::array<double, 4> sum{};
-  for (Quad& q : layer.quads) {
+  for (const Quad& q : layer.quads) {
     std::array<Vec3d, 4> p, m{};
     for (std::size_t k = 0; k < 4; ++k) {
       const MovableLayer& of = q[k] >= layer.first ? layer : *below;
@@ -160,11 +160,7 @@ std::array<double, 4> KeepVolume::split(std::size_t n) {
       m[k] = unit * Vec3d{1.0 * move[0], 1.0 * move[1], 1.0 * move[2]};
     }
     const Vec3d first = p[2] + m[2] - p[0] - m[0], second = p[3] + m[3] - p[1] - m[1];
-    std::size_t a = 0;
-    if (dot(first, first) > dot(second, second)) {
-      q = {q[3], q[0], q[1], q[2]};
-      a = 3;
-    }
+    const std::size_t a = dot(first, first) <= dot(second, second) ? 0 : 1;
     const std::size_t b = (a + 1) & 3, c = (a + 2) & 3, d = (a + 3) & 3;
     // Both triangles: a . (c x (d - b)), each corner p + step m.
     const Vec3d across = p[d] - p[b];
@@ -184,6 +180,9 @@ double KeepVolume::step(double wanted_mm3) const {
   const auto missing = [&](double s) {
     return volume_[0] + s * (volume_[1] + s * (volume_[2] + s * volume_[3])) - 6 * wanted_mm3;
   };
+  // Nearly always the move is right as it is; where hardly anything moves, a volume that is right too asks for nothing.
+  constexpr double close_enough = 1e-3;
+  if (std::abs(missing(1)) <= 6 * close_enough * std::abs(wanted_mm3)) return 1;
   double low = 0, high = 2;
   if ((missing(low) < 0) == (missing(high) < 0)) {
     // A field that is no distance may hold a volume that no such move can reach.

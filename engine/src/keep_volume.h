@@ -13,7 +13,6 @@
 
 namespace fibrolite {
 
-/// Quads are turned so that each is split from its first corner to its third.
 struct MovableLayer : QuadLayer {
   using Move = std::array<std::int16_t, 3>;
   std::vector<Move> moves;  ///< Per point, times move_unit(); none if nothing moves.
@@ -55,13 +54,13 @@ class KeepVolume {
   void settle(std::size_t n);
   void look_around(std::size_t n);
   void choose_moves(std::size_t n);
-  [[nodiscard]] std::array<double, 4> split(std::size_t n);
+  [[nodiscard]] std::array<double, 4> volume_of(std::size_t n) const;
 
   double voxel_mm_;
   bool moving_;
   std::deque<Work> window_;  // the first is done already, unless it is the very first
   // How many of the window have had their quads summed, their normals settled, ...
-  std::size_t summed_ = 0, settled_ = 0, looked_ = 0, moved_ = 0, split_ = 0;
+  std::size_t summed_ = 0, settled_ = 0, looked_ = 0, moved_ = 0, measured_ = 0;
   std::array<double, 4> volume_{};  // six times it, by powers of the step
 };
 

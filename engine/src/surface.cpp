@@ -163,15 +163,22 @@ class Finisher {
     }
   }
 
-  /// Each quad along its diagonal, unless that leaves a triangle without area.
+  /// Each quad along its shorter diagonal, unless that leaves a triangle without area.
   void hand_on() {
     if (before_ + upper_ == 0) return;
     triangles_.resize(2 * quads_.size());
+    const auto squared_distance = [this](std::uint32_t a, std::uint32_t b) {
+      const Vec3d d = to_double(at(a)) - to_double(at(b));
+      return dot(d, d);
+    };
     each_chunk(quads_.size(), [&](std::size_t i) {
       const Quad& q = quads_[i];
-      const bool other = flat(q[0], q[1], q[2]) || flat(q[0], q[2], q[3]);
-      triangles_[2 * i] = {q[0], q[1], other ? q[3] : q[2]};
-      triangles_[2 * i + 1] = {other ? q[1] : q[0], q[2], q[3]};
+      bool first = squared_distance(q[0], q[2]) <= squared_distance(q[1], q[3]);
+      const auto without_area = [&](std::size_t a, std::size_t b, std::size_t c) { return flat(q[a], q[b], q[c]); };
+      if (first ? without_area(0, 1, 2) || without_area(0, 2, 3) : without_area(0, 1, 3) || without_area(1, 2, 3))
+        first = !first;
+      triangles_[2 * i] = {q[0], q[1], first ? q[2] : q[3]};
+      triangles_[2 * i + 1] = {first ? q[0] : q[1], q[2], q[3]};
     });
     use_({std::span(points_).first(before_ + upper_), first_, before_, triangles_, {}});
     points_.erase(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_));

@@ -228,13 +228,13 @@ void each_on_ring(const Frame& section, double radius, const Visit& visit) {
 
 /// Where along its axis a core is stressed most, and what runs through the section there.
 struct Waist {
-  double stress_mpa = 0;  // along the axis, mean within two samples of it
+  double stress_mpa = 0;  // along the axis, mean within three samples of it
   double force_n = 0;     // integral of the magnitude of the stress along the axis over the host's section
 };
 
 Waist waist_of(const Stresses& stresses, const Samples& samples, const Stream& stream, const Frame& frame,
                std::pair<double, double> chord) {
-  // Slabs three samples thick about each place, so that one ill-shaped tetrahedron decides nothing.
+  // Slabs five samples thick about each place, so that one ill-shaped tetrahedron decides nothing.
   const double h = samples.step_mm;
   struct Slab {
     double near = 0, near_count = 0, all = 0;
@@ -248,20 +248,20 @@ Waist waist_of(const Stresses& stresses, const Samples& samples, const Stream& s
     const double stress = stresses.along(p, frame.z);
     Slab& slab = slabs[static_cast<std::size_t>(k)];
     slab.all += stress;
-    if (std::hypot(local.x, local.y) > 2 * h) continue;
+    if (std::hypot(local.x, local.y) > 3 * h) continue;
     slab.near += stress;
     ++slab.near_count;
   }
   Waist waist;
-  for (std::size_t k = 1; k + 1 < slabs.size(); ++k) {
+  for (std::size_t k = 2; k + 2 < slabs.size(); ++k) {
     Slab sum;
-    for (std::size_t i = k - 1; i <= k + 1; ++i) {
+    for (std::size_t i = k - 2; i <= k + 2; ++i) {
       sum.near += slabs[i].near;
       sum.near_count += slabs[i].near_count;
       sum.all += slabs[i].all;
     }
     if (!(sum.near_count > 0) || sum.near / sum.near_count <= waist.stress_mpa) continue;
-    waist = {sum.near / sum.near_count, sum.all * h * h / 3};
+    waist = {sum.near / sum.near_count, sum.all * h * h / 5};
   }
   return waist;
 }

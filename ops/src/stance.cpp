@@ -70,7 +70,10 @@ Frame stance(const VerifyParams& params) {
   if (!(norm(params.up) > 0) || !std::isfinite(norm(params.up)) || !std::isfinite(params.azimuth_deg))
     throw Error(Code::BadRecipe, "up must be a direction and azimuth_deg a number", "verify");
   const Vec3d up = normalized(params.up);
-  const std::vector<Vec3d> along = directions(params);
+  std::vector<Vec3d> along = directions(params);
+  // A load that comes from above, up to the slant of the second one, is one on a model that stands as `up` says.
+  constexpr double least_down = 0.7;
+  if (!along.empty() && -dot(along.front(), up) > least_down) along.clear();
   const Vec3d z = tidy(along.empty() ? up : -along.front());
   Vec3d from = slanted_from(z, params.azimuth_deg);
   for (const Vec3d d : along)

@@ -11,10 +11,10 @@
 
 namespace fibrolite {
 
-/// z is against the first force, x points level to where the next one comes from that is not parallel to it. Without
-/// load cases of its own, or with pressures alone: z is `params.up`, x where the slanted load comes from; a single
-/// force leaves x to the world, as azimuth 0 does. The origin stays. World axes exactly where
-/// they are that up to rounding: a quarter turn then changes no bit of what is decided.
+/// z is `params.up`, x where the slanted load comes from. Load cases whose first force is more than 45 degrees off
+/// straight down have been turned with the model: then z is against that force, and x points level to where the next
+/// one comes from that is not parallel to it; a single force leaves x to the world, as azimuth 0 does. The origin
+/// stays. World axes exactly where they are that up to rounding: a quarter turn then changes no bit of what is decided.
 /// @throws Error BadRecipe: up has no direction.
 [[nodiscard]] Frame stance(const VerifyParams& params);
 /// The same load as `params`, seen in its stance: up is z and the azimuth 0, unless the load cases say otherwise.
