@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <new>
 #include <string_view>
+#include <vector>
 
 #include "fibrolite/error.h"
 
@@ -29,8 +30,8 @@ void append_chunk(std::string& text, std::string_view name, std::string_view dat
 class Deflater {
  public:
   Deflater() {
-    // Runs and gradients only: as small as the default on layers, in a third of the time.
-    if (deflateInit2(&stream_, 4, Z_DEFLATED, 15, 8, Z_DEFAULT_STRATEGY) != Z_OK) throw std::bad_alloc();
+    // Runs alone: on layers a few per cent larger than with a search for repeats, in a third of the time.
+    if (deflateInit2(&stream_, 4, Z_DEFLATED, 15, 8, Z_RLE) != Z_OK) throw std::bad_alloc();
   }
   ~Deflater() { deflateEnd(&stream_); }
   Deflater(const Deflater&) = delete;
@@ -68,12 +69,14 @@ std::string png_upright(const GrayImage& image) {
   // Each row as its difference to the one above (filter 2): what stands upright in a layer becomes zeros.
   constexpr char up = 2;
   Deflater deflater;
-  std::string row(static_cast<std::size_t>(image.width) + 1, up);
+  const auto width = static_cast<std::size_t>(image.width);
+  const std::vector<std::uint8_t> empty(width, 0);
+  std::string row(width + 1, up);
   for (int y = image.height - 1; y >= 0; --y) {
-    for (int x = 0; x < image.width; ++x) {
-      const int above = y + 1 < image.height ? image(x, y + 1) : 0;
-      row[static_cast<std::size_t>(x) + 1] = static_cast<char>(image(x, y) - above);
-    }
+    const std::uint8_t* const here = image.pixels.data() + static_cast<std::size_t>(y) * width;
+    const std::uint8_t* const above = y + 1 < image.height ? here + width : empty.data();
+    char* const to = row.data() + 1;  // looked up once: a store of a char may change anything
+    for (std::size_t x = 0; x < width; ++x) to[x] = static_cast<char>(here[x] - above[x]);
     deflater.add(row, y == 0);
   }
   append_chunk(png, "IDAT", deflater.out);

@@ -221,19 +221,21 @@ struct Retouched final : Shape::Function {
 
   void evaluate(const PointBlock& block, float* out) const override {
     made.evaluate(block, out);
+    Box3d box;
+    const auto count = static_cast<std::size_t>(block.count);
+    for (std::size_t k = 0; k < count; ++k) box.include(Vec3d{block.x[k], block.y[k], block.z[k]});
     Values ball, b;
-    pores.evaluate(block, ball.data());
-    if (near(block, ball)) {
+    if (pores.bound(box).lo < radius) {
+      pores.evaluate(block, ball.data());
       body.evaluate(block, b.data());
-      for (std::size_t k = 0; k < static_cast<std::size_t>(block.count); ++k)
+      for (std::size_t k = 0; k < count; ++k)
         if (ball[k] < radius) out[k] = std::min(out[k], std::max(b[k], ball[k]));
     }
-    specks.evaluate(block, ball.data());
-    for (std::size_t k = 0; k < static_cast<std::size_t>(block.count); ++k)
-      if (ball[k] < radius) out[k] = std::max(out[k], -ball[k]);
-  }
-  [[nodiscard]] bool near(const PointBlock& block, const Values& ball) const {
-    return *std::min_element(ball.begin(), ball.begin() + block.count) < radius;
+    if (specks.bound(box).lo < radius) {
+      specks.evaluate(block, ball.data());
+      for (std::size_t k = 0; k < count; ++k)
+        if (ball[k] < radius) out[k] = std::max(out[k], -ball[k]);
+    }
   }
   [[nodiscard]] Interval bound(const Box3d& box) const override {
     const Interval m = made.bound(box), p = pores.bound(box), s = specks.bound(box);
