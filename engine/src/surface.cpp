@@ -107,20 +107,28 @@ class Finisher {
  public:
   using Use = std::function<void(const MeshLayer&)>;
   Finisher(double step, double voxel_mm, const Use& use)
-      : step_(static_cast<float>(step) * move_unit(voxel_mm)), voxel_mm_(voxel_mm), use_(use) {}
+      : step_(static_cast<float>(step) * move_unit(voxel_mm)),
+        whole_step_(move_unit(voxel_mm)),
+        voxel_mm_(voxel_mm),
+        use_(use) {}
 
   void add(const MovableLayer& layer) {
     const std::size_t from = points_.size();
     if (from == 0) first_ = layer.first;
-    points_.resize(from + layer.points.size());
-    each_chunk(layer.points.size(), [&](std::size_t i) {
+    const auto moved = [&](std::size_t i, float step) {
       openvdb::Vec3s p = layer.points[i];
       if (!layer.moves.empty()) {
         const MovableLayer::Move& move = layer.moves[i];
-        p += step_ * openvdb::Vec3s(move[0], move[1], move[2]);
+        p += step * openvdb::Vec3s(move[0], move[1], move[2]);
       }
-      points_[from + i] = {p.x(), p.y(), p.z()};
-    });
+      return Vec3f{p.x(), p.y(), p.z()};
+    };
+    points_.resize(from + layer.points.size());
+    each_chunk(layer.points.size(), [&](std::size_t i) { points_[from + i] = moved(i, step_); });
+    if (step_ != whole_step_) {
+      whole_.resize(points_.size());
+      each_chunk(layer.points.size(), [&](std::size_t i) { whole_[from + i] = moved(i, whole_step_); });
+    }
     shake_degenerate(layer.quads);
     hand_on();
     before_ = upper_;
@@ -163,12 +171,14 @@ class Finisher {
     }
   }
 
-  /// Each quad along its shorter diagonal, unless that leaves a triangle without area.
+  /// Each quad along the diagonal that is shorter after a whole move, as its volume was measured, unless that leaves a
+  /// triangle without area.
   void hand_on() {
     if (before_ + upper_ == 0) return;
     triangles_.resize(2 * quads_.size());
-    const auto squared_distance = [this](std::uint32_t a, std::uint32_t b) {
-      const Vec3d d = to_double(at(a)) - to_double(at(b));
+    const std::vector<Vec3f>& points = whole_.empty() ? points_ : whole_;
+    const auto squared_distance = [&](std::uint32_t a, std::uint32_t b) {
+      const Vec3d d = to_double(points[a - first_]) - to_double(points[b - first_]);
       return dot(d, d);
     };
     each_chunk(quads_.size(), [&](std::size_t i) {
@@ -181,15 +191,18 @@ class Finisher {
       triangles_[2 * i + 1] = {first ? q[0] : q[1], q[2], q[3]};
     });
     use_({std::span(points_).first(before_ + upper_), first_, before_, triangles_, {}});
-    points_.erase(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_));
+    const auto below = static_cast<std::ptrdiff_t>(before_);
+    points_.erase(points_.begin(), points_.begin() + below);
+    if (!whole_.empty()) whole_.erase(whole_.begin(), whole_.begin() + below);
     first_ += before_;
   }
 
-  float step_;  // mm for each unit of a move
+  float step_, whole_step_;  // mm for each unit of a move
   double voxel_mm_;
   const Use& use_;
   // Of the layer below the one that waits, that one, and for a moment the next.
   std::vector<Vec3f> points_;
+  std::vector<Vec3f> whole_;  // the same after a whole move, if that is another step
   std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
   std::vector<Quad> quads_;  // of the one that waits
   std::vector<Mesh::Triangle> triangles_;
@@ -235,7 +248,7 @@ void SurfaceLayers::add(const Solid& solid, const SampleRange& range, const Cont
 
 void SurfaceLayers::finish(double volume_mm3) {
   impl_->keep.finish([&](MovableLayer&& done) { impl_->push(std::move(done)); });
-  impl_->step = impl_->params.keep_volume ? impl_->keep.step(volume_mm3) : 0;
+  impl_->step = impl_->params.keep_volume ? impl_->keep.step(volume_mm3) : 1;
   impl_->finished = true;
 }
 
