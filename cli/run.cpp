@@ -78,11 +78,16 @@ std::optional<SlabPlan> fit_into_memory(const Mesh& model, double voxel_mm, cons
   const double allowed = run.allowed_bytes();
   const auto as_whole = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes + more_bytes; };
   if (as_whole(voxel_mm) <= allowed) return std::nullopt;
-  const auto plan = [&](double voxel) { return plan_slabs(model, voxel, recipe, infill, needs, allowed - more_bytes); };
-  const auto in_slabs = [&](double voxel) { return plan(voxel).memory_bytes + more_bytes; };
   if (!whole.empty()) refuse(model, voxel_mm, as_whole, allowed, ", and " + whole + " needs the whole solid in it");
-  if (in_slabs(voxel_mm) > allowed) refuse(model, voxel_mm, in_slabs, allowed, " even slab by slab");
-  return plan(voxel_mm);
+  const auto plan_of = [&](double voxel) {
+    return plan_slabs(model, voxel, recipe, infill, needs, allowed - more_bytes);
+  };
+  SlabPlan plan = plan_of(voxel_mm);
+  if (plan.memory_bytes + more_bytes > allowed) {
+    const auto in_slabs = [&](double voxel) { return plan_of(voxel).memory_bytes + more_bytes; };
+    refuse(model, voxel_mm, in_slabs, allowed, " even slab by slab");
+  }
+  return plan;
 }
 
 FoundParts find_parts(const Model& model, const Recipe& recipe, Report& report, const Context& context) {

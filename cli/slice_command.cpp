@@ -100,12 +100,6 @@ void check_plates(const SliceOptions& options, const std::vector<SlicePlate>& pl
   }
 }
 
-/// The world axis that layers lie across.
-int axis_of(Up up) {
-  const Vec3d d = direction(up);
-  return d.x != 0 ? 0 : d.y != 0 ? 1 : 2;
-}
-
 /// Layers from slab after slab: those whose middle lies in it.
 std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, const Context& context) {
   return [stream, context](const SlicePlate& plate, int first) mutable {
@@ -213,9 +207,8 @@ void slice_to_files(const SliceOptions& options) {
                   {options.layer_mm.value_or(0.05), options.pixel_mm.value_or(0.05), options.printer, options.tile});
   check_plates(options, plates, source.memory);
   if (!options.from_solid()) {
-    const double margin_mm = 0.5 * options.layer_mm.value_or(0.05) + 4 * *params.voxel_mm;
     params.slabs = fit_into_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
-                                   {.axis = axis_of(options.model.up), .margin_mm = margin_mm},
+                                   needs_of_layers(options.model.up, options.layer_mm.value_or(0.05), *params.voxel_mm),
                                    slicing_memory(plates.front().grid),
                                    params.recipe.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "");
     source.slabs = params.slabs;

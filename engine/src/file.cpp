@@ -176,7 +176,13 @@ void OutputFile::commit() {
 }
 
 ScratchFile::ScratchFile(const fs::path& folder) : folder_(folder) {
-  std::string name = (folder / ".fibrolite-XXXXXX").string();
+  const fs::path place = folder.empty() ? fs::path(".") : folder;
+#ifdef O_TMPFILE
+  fd_ = ::open(place.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (fd_ >= 0) return;
+#endif
+  // Not every file system has files without a name from the start.
+  std::string name = (place / ".fibrolite-XXXXXX").string();
   fd_ = ::mkostemp(name.data(), O_CLOEXEC);
   if (fd_ < 0) throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string());
   ::unlink(name.c_str());

@@ -26,7 +26,8 @@ struct MovableLayer : QuadLayer {
 /// edges stay where they are: an edge is a bend beside something flat; a stick as thin as two voxels bends as much but
 /// has nothing flat around it.
 ///
-/// Works on a few layers at a time: what a vertex does depends on the quads of its own layer and the three above.
+/// Works on a few layers at a time: what a vertex does depends on the quads of its own layer, the one below and the two
+/// above.
 class KeepVolume {
  public:
   using Use = std::function<void(MovableLayer&&)>;

@@ -116,5 +116,9 @@ void append_bytes(std::string& text, const T& value) {
 /// The shortest decimal that reads back to the same float.
 void append_number(std::string& text, float value);
 void append_number(std::string& text, std::uint64_t value);
+/// " x y z" and the end of the line.
+void append_line(std::string& text, Vec3f point);
+/// The same of a triangle's corners, counted from `first`.
+void append_line(std::string& text, const Mesh::Triangle& corners, std::uint64_t first);
 
 }  // namespace fibrolite

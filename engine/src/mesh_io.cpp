@@ -49,6 +49,15 @@ void append_shortest(std::string& text, T value) {
 void append_number(std::string& text, float value) { append_shortest(text, value); }
 void append_number(std::string& text, std::uint64_t value) { append_shortest(text, value); }
 
+void append_line(std::string& text, Vec3f point) {
+  for (const float x : {point.x, point.y, point.z}) append_number(text += ' ', x);
+  text += '\n';
+}
+void append_line(std::string& text, const Mesh::Triangle& corners, std::uint64_t first) {
+  for (const std::uint32_t i : corners) append_number(text += ' ', i + first);
+  text += '\n';
+}
+
 std::vector<std::string> readable_mesh_endings() { return endings(); }
 std::vector<std::string> writable_mesh_endings() { return endings(); }
 

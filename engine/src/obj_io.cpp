@@ -73,22 +73,10 @@ MeshFile read_obj(const Source& source, const Context& context) { return ObjRead
 
 void write_obj(OutputFile& file, const MeshLayers& mesh, const Context& context) {
   file.write("# Millimetres, by Fibrolite\n");
-  const auto vertex = [](std::string& text, Vec3f p) {
-    text += 'v';
-    for (const float x : {p.x, p.y, p.z}) {
-      text += ' ';
-      append_number(text, x);
-    }
-    text += '\n';
-  };
+  const auto vertex = [](std::string& text, Vec3f p) { append_line(text += 'v', p); };
   for_vertices(mesh, context.part(0, 0.4, ""), vertex, WriteChunks{file});
   const auto face = [](std::string& text, const MeshLayer& layer, std::size_t t) {
-    text += 'f';
-    for (const std::uint32_t i : layer.triangles[t]) {
-      text += ' ';
-      append_number(text, std::uint64_t{i} + 1);
-    }
-    text += '\n';
+    append_line(text += 'f', layer.triangles[t], 1);
   };
   for_triangles(mesh, context.part(0.4, 1, ""), face, WriteChunks{file});
 }

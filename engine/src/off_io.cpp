@@ -92,12 +92,7 @@ void write_off(OutputFile& file, const MeshLayers& mesh, const Context& context)
   };
   for_vertices(mesh, context.part(0, 0.4, ""), vertex, WriteChunks{file});
   const auto face = [](std::string& text, const MeshLayer& layer, std::size_t t) {
-    text += '3';
-    for (const std::uint32_t i : layer.triangles[t]) {
-      text += ' ';
-      append_number(text, std::uint64_t{i});
-    }
-    text += '\n';
+    append_line(text += '3', layer.triangles[t], 0);
   };
   for_triangles(mesh, context.part(0.4, 1, ""), face, WriteChunks{file});
 }

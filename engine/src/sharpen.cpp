@@ -18,8 +18,6 @@
 namespace fibrolite {
 namespace {
 
-using Quad = std::array<std::uint32_t, 4>;
-
 /// A bend of more than about 20 degrees between a quad and the mean about a vertex.
 constexpr double smooth_cosine = 0.94;
 /// Directions in which the planes say less than this, relative to the best known one, stay as they are.

@@ -32,19 +32,7 @@ void spread(std::vector<Vec3d>& force_n, const TetFace& face, const CornerTriang
   }
 }
 
-Vec3d resolved(const Direction& d, const LoadSetting& setting) {
-  switch (d.of) {
-    case Direction::Of::World:
-      break;
-    case Direction::Of::Up:
-      return setting.up;
-    case Direction::Of::Down:
-      return -setting.up;
-    case Direction::Of::Slanted:
-      return load_directions(setting.up, setting.azimuth_deg)[1];
-  }
-  return normalized(d.vector);
-}
+Vec3d resolved(const Direction& d, const LoadSetting& setting) { return resolved(d, setting.up, setting.azimuth_deg); }
 
 Region resolved(const Selection& where, const TetMesh& body, const LoadSetting& setting) {
   Region region;

@@ -133,4 +133,18 @@ std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg) {
   return {-up, normalized(-(up + slanted_from(up, azimuth_deg)))};
 }
 
+Vec3d resolved(const Direction& direction, Vec3d up, double azimuth_deg) {
+  switch (direction.of) {
+    case Direction::Of::World:
+      break;
+    case Direction::Of::Up:
+      return up;
+    case Direction::Of::Down:
+      return -up;
+    case Direction::Of::Slanted:
+      return load_directions(up, azimuth_deg)[1];
+  }
+  return normalized(direction.vector);
+}
+
 }  // namespace fibrolite

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fibrolite/frame.h"
+#include "fibrolite/ops/loads.h"
 #include "fibrolite/tet_mesh.h"
 
 namespace fibrolite {
@@ -40,5 +41,7 @@ struct Footprint {
 /// Unit directions of the two load cases: straight down, and 45 degrees from it, coming from `azimuth_deg` about `up`.
 /// Azimuth 0 is the next world axis after the one nearest to `up` (x for z, y for x, z for y), made level.
 [[nodiscard]] std::vector<Vec3d> load_directions(Vec3d up, double azimuth_deg);
+/// The unit vector of a direction, for a unit vector `up`.
+[[nodiscard]] Vec3d resolved(const Direction& direction, Vec3d up, double azimuth_deg);
 
 }  // namespace fibrolite

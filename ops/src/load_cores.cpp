@@ -235,6 +235,8 @@ struct Waist {
 Waist waist_of(const Stresses& stresses, const Samples& samples, const Stream& stream, const Frame& frame,
                std::pair<double, double> chord) {
   // Slabs five samples thick about each place, so that one ill-shaped tetrahedron decides nothing.
+  constexpr std::size_t beside = 2;  // slabs on either side
+  constexpr double around = 3;       // samples
   const double h = samples.step_mm;
   struct Slab {
     double near = 0, near_count = 0, all = 0;
@@ -248,20 +250,20 @@ Waist waist_of(const Stresses& stresses, const Samples& samples, const Stream& s
     const double stress = stresses.along(p, frame.z);
     Slab& slab = slabs[static_cast<std::size_t>(k)];
     slab.all += stress;
-    if (std::hypot(local.x, local.y) > 3 * h) continue;
+    if (std::hypot(local.x, local.y) > around * h) continue;
     slab.near += stress;
     ++slab.near_count;
   }
   Waist waist;
-  for (std::size_t k = 2; k + 2 < slabs.size(); ++k) {
+  for (std::size_t k = beside; k + beside < slabs.size(); ++k) {
     Slab sum;
-    for (std::size_t i = k - 2; i <= k + 2; ++i) {
+    for (std::size_t i = k - beside; i <= k + beside; ++i) {
       sum.near += slabs[i].near;
       sum.near_count += slabs[i].near_count;
       sum.all += slabs[i].all;
     }
     if (!(sum.near_count > 0) || sum.near / sum.near_count <= waist.stress_mpa) continue;
-    waist = {sum.near / sum.near_count, sum.all * h * h / 5};
+    waist = {sum.near / sum.near_count, sum.all * h * h / (2 * beside + 1)};
   }
   return waist;
 }

@@ -168,6 +168,11 @@ double machine_times() {
   return best_s / there_s;
 }
 
+SlabNeeds needs_of_layers(Up up, double layer_mm, double voxel_mm) {
+  const Vec3d d = direction(up);
+  return {.axis = d.x != 0 ? 0 : d.y != 0 ? 1 : 2, .margin_mm = 0.5 * layer_mm + 4 * voxel_mm};
+}
+
 SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const SlabNeeds& needs,
                     double allowed_bytes) {
   constexpr double most_blocks = 1e6;  // no machine has the memory for one of such slabs

@@ -73,19 +73,14 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
   check_recipe(fill.recipe, *fill.voxel_mm, fill.infill);
   if (const double needed = predict(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill).memory_bytes;
       needed > params.max_memory_bytes) {
-    const Vec3d up = direction(params.up);
-    const double margin_mm = 0.5 * params.layer_mm + 4 * *fill.voxel_mm;
     fill.slabs = plan_slabs(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill,
-                            {.axis = up.x != 0   ? 0
-                                     : up.y != 0 ? 1
-                                                 : 2,
-                             .margin_mm = margin_mm},
-                            params.max_memory_bytes);
-    const double least = fill.slabs->memory_bytes;
-    if (least > params.max_memory_bytes || fill.recipe.print.drain_mm.value_or(0) > 0) {
+                            needs_of_layers(params.up, params.layer_mm, *fill.voxel_mm), params.max_memory_bytes);
+    const bool drains = fill.recipe.print.drain_mm.value_or(0) > 0;
+    if (drains || fill.slabs->memory_bytes > params.max_memory_bytes) {
       throw Error(Code::TooLarge,
-                  "the run would need about " + gigabytes(std::min(least, needed)) + " of memory, more than " +
-                      gigabytes(params.max_memory_bytes),
+                  "the run would need about " + gigabytes(drains ? needed : fill.slabs->memory_bytes) +
+                      " of memory, more than " + gigabytes(params.max_memory_bytes) +
+                      (drains ? ", and print.drain_mm needs the whole solid in it" : " even slab by slab"),
                   number_text(*fill.voxel_mm).insert(0, "voxel ") + " mm", "use a larger voxel, or allow more memory");
     }
     fill.function = false;

@@ -33,25 +33,13 @@ constexpr double least_sine = 0.05;  // directions nearer to parallel say nothin
 /// Where the forces that decide go, one by one: unit vectors. Pressures have none.
 std::vector<Vec3d> directions(const VerifyParams& params) {
   const Vec3d up = normalized(params.up);
-  const auto resolved = [&](const Direction& d) {
-    switch (d.of) {
-      case Direction::Of::World:
-        break;
-      case Direction::Of::Up:
-        return up;
-      case Direction::Of::Down:
-        return -up;
-      case Direction::Of::Slanted:
-        return load_directions(up, params.azimuth_deg)[1];
-    }
-    return normalized(d.vector);
-  };
+  const auto unit = [&](const Direction& d) { return resolved(d, up, params.azimuth_deg); };
   std::vector<Vec3d> found;
   for (const LoadCase& one : params.loads) {
     if (one.unplanned) continue;
     for (const Force& force : one.forces) {
-      if (const auto* total = std::get_if<TotalForce>(&force)) found.push_back(resolved(total->direction));
-      if (const auto* weight = std::get_if<Gravity>(&force)) found.push_back(resolved(weight->direction));
+      if (const auto* total = std::get_if<TotalForce>(&force)) found.push_back(unit(total->direction));
+      if (const auto* weight = std::get_if<Gravity>(&force)) found.push_back(unit(weight->direction));
     }
   }
   return found;

@@ -135,19 +135,7 @@ class OnVoxels {
   [[nodiscard]] double load_n() const { return load_n_; }
 
  private:
-  [[nodiscard]] Vec3d unit(const Direction& d) const {
-    switch (d.of) {
-      case Direction::Of::World:
-        return normalized(d.vector);
-      case Direction::Of::Up:
-        return up_;
-      case Direction::Of::Down:
-        return -up_;
-      case Direction::Of::Slanted:
-        return load_directions(up_, verify_.azimuth_deg)[1];
-    }
-    return {};
-  }
+  [[nodiscard]] Vec3d unit(const Direction& d) const { return resolved(d, up_, verify_.azimuth_deg); }
   [[nodiscard]] std::array<bool, 3> axes_of(const Direction& d, const std::string& name) const {
     const Vec3d along = unit(d);
     for (int axis = 0; axis < 3; ++axis) {

@@ -143,6 +143,30 @@ TEST(OutputFile, discarding_removes_what_is_uncommitted_and_stops_its_commit) {
   EXPECT_EQ(files_in(dir.path()), 1);
 }
 
+TEST(ScratchFile, gives_back_what_was_appended_and_leaves_no_name) {
+  const TempDir dir;
+  ScratchFile file(dir.path());
+  const std::string first(3'000'000, 'a'), second = "second";
+  const auto append = [&](const std::string& text) { return file.append(std::as_bytes(std::span(text))); };
+  const std::uint64_t at_first = append(first), at_second = append(second);
+  const auto read = [&](std::uint64_t at, std::size_t size) {
+    std::string text(size, ' ');
+    file.read(at, std::as_writable_bytes(std::span(text)));
+    return text;
+  };
+  EXPECT_EQ(read(at_second, second.size()), second);
+  EXPECT_EQ(read(at_first, first.size()), first);
+  EXPECT_EQ(files_in(dir.path()), 0);
+  EXPECT_EQ(error_of([&] { read(at_second, 100); }).code(), Code::Io);
+}
+
+TEST(ScratchFile, names_a_missing_folder) {
+  const TempDir dir;
+  const Error error = error_of([&] { ScratchFile(dir.path() / "nowhere"); });
+  EXPECT_EQ(error.code(), Code::Io);
+  EXPECT_THAT(error.what(), HasSubstr("nowhere"));
+}
+
 // A file system of 64 KiB.
 class SmallDisk : public ::testing::Test {
  protected:
@@ -173,6 +197,14 @@ TEST_F(SmallDisk, a_full_disk_is_an_error_and_keeps_the_old_file) {
   }
   EXPECT_EQ(content(dir / "out.txt"), "old");
   EXPECT_EQ(files_in(dir.path()), 1);
+}
+
+TEST_F(SmallDisk, a_full_disk_ends_a_scratch_file_too) {
+  const std::string much(100'000, 'x');
+  ScratchFile file(dir.path());
+  const Error error = error_of([&] { file.append(std::as_bytes(std::span(much))); });
+  EXPECT_EQ(error.code(), Code::Io);
+  EXPECT_THAT(error.what(), HasSubstr("No space left"));
 }
 
 }  // namespace

@@ -292,8 +292,20 @@ TEST(Slicer, WithLessMemoryThePixelsAreTheSameSlabBySlab) {
     EXPECT_EQ(first[i].pixels, whole.layer(37 * static_cast<int>(i) % layers).coverage.pixels) << i;
     EXPECT_EQ(second[i].pixels, whole.layer((layers / 2 + 37 * static_cast<int>(i)) % layers).coverage.pixels) << i;
   }
+  const auto refused = [&]() -> std::string {
+    try {
+      const Slicer made(model, params);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), Code::TooLarge);
+      return error.what();
+    }
+    return "made";
+  };
+  params.fill.recipe.print.drain_mm = 2;
+  EXPECT_THAT(refused(), HasSubstr("print.drain_mm needs the whole solid"));
+  params.fill.recipe.print.drain_mm.reset();
   params.max_memory_bytes = 60e6;
-  EXPECT_THROW((void)Slicer(model, params), Error);
+  EXPECT_THAT(refused(), HasSubstr("even slab by slab"));
 }
 
 TEST(Slicer, InCppThePixelsAreTheSame) {

@@ -64,11 +64,12 @@ struct Hybrid {
 struct Prediction {
   double memory_bytes = 0;  ///< At its highest.
   double active_voxels = 0, triangles = 0;
-  double cpu_s = 0;    ///< Until the mesh is checked, on the machine the fits were made on.
-  double slabs_s = 0;  ///< What slabs add to it.
+  double cpu_s = 0;    ///< Until the mesh is checked; times machine_times().
+  double slabs_s = 0;  ///< What slabs add to that.
 };
-/// How many times as long this machine takes as that one, for the crystal at some points. Takes a few milliseconds.
-[[nodiscard]] double machine_times();
 [[nodiscard]] Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill);
+/// How many times as long this machine takes as the one Prediction::cpu_s was fitted on, for the crystal at some
+/// points. Cost: a few milliseconds.
+[[nodiscard]] double machine_times();
 
 }  // namespace fibrolite

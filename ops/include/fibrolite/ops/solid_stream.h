@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fibrolite/context.h"
+#include "fibrolite/ops/prepare.h"
 #include "fibrolite/ops/recipe.h"
 #include "fibrolite/ops/report.h"
 #include "fibrolite/shape.h"
@@ -27,6 +28,8 @@ struct SlabNeeds {
   double margin_mm = 0;  ///< How far beyond a slab the solid will be looked at.
   bool surface = false;  ///< Will its surface be made, a few layers of blocks at a time (SurfaceLayers)?
 };
+/// To cut layers of this height across `up`.
+[[nodiscard]] SlabNeeds needs_of_layers(Up up, double layer_mm, double voxel_mm);
 /// Slabs as thick as the memory allows, by how much surface and lumen there is across the axis.
 /// Cost: O(triangles).
 [[nodiscard]] SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill,
