@@ -29,7 +29,11 @@ struct Outcome {
 class Blocks {
  public:
   Blocks(const Shape& shape, Grid spec, const Context& context)
-      : shape_(shape), spec_(spec), band_(static_cast<float>(spec.voxel_mm) * spec.band_vox), context_(context) {}
+      : shape_(shape),
+        spec_(spec),
+        band_(static_cast<float>(spec.voxel_mm) * spec.band_vox),
+        deepest_(static_cast<float>(spec.voxel_mm) * std::max(spec.band_vox, spec.inside_vox)),
+        context_(context) {}
 
   [[nodiscard]] Solid run(const std::vector<openvdb::Coord>& origins) const {
     auto grid = make_grid(spec_);
@@ -117,7 +121,7 @@ class Blocks {
       if (std::abs(v) < nudge) v = v < 0 ? -nudge : nudge;
       if (std::abs(v) < band_) active.setOn(i);
       any_inside |= v < 0;
-      values[i] = std::clamp(v, -band_, band_);
+      values[i] = std::clamp(v, -deepest_, band_);
     }
     if (active.isOff()) {
       const bool all_inside = *std::max_element(values.begin(), values.end()) < 0;
@@ -131,7 +135,7 @@ class Blocks {
 
   const Shape& shape_;
   Grid spec_;
-  float band_;
+  float band_, deepest_;
   const Context& context_;
 };
 

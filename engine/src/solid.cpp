@@ -274,7 +274,21 @@ float Solid::distance(Vec3d p) const {
 
 Shape distance_to(const Solid& solid) { return Shape(std::make_shared<const SolidDistance>(solid)); }
 
-openvdb::FloatGrid::ConstPtr to_vdb(const Solid& solid) { return solid.impl().grid; }
+Solid narrowed(Solid solid) {
+  Grid spec = solid.grid();
+  if (spec.inside_vox <= spec.band_vox) return solid;
+  const openvdb::FloatGrid::Ptr grid = editable(std::move(solid));
+  const float deepest = -grid->background();
+  openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid->tree());
+  leaves.foreach ([deepest](auto& leaf, std::size_t) {
+    float* const values = leaf.buffer().data();
+    for (openvdb::Index i = 0; i < leaf.SIZE; ++i) values[i] = std::max(values[i], deepest);
+  });
+  spec.inside_vox = 0;
+  return make_solid(grid, spec);
+}
+
+openvdb::FloatGrid::ConstPtr to_vdb(const Solid& solid) { return narrowed(solid).impl().grid; }
 
 Solid from_vdb(const openvdb::FloatGrid::ConstPtr& grid) {
   if (grid == nullptr) throw Error(Code::BadInput, "no grid given");

@@ -74,9 +74,10 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   });
 
   // One composed shape, made into voxels once, in one piece.
-  const Grid grid{.voxel_mm = voxel};
+  const double neck_mm = tie_params(recipe, params.infill, everything(), voxel).neck_mm;
+  const Grid grid = telling(neck_mm, {.voxel_mm = voxel});
   const double shell_mm = recipe.shell.thickness_mm;
-  report.solid.neck_mm = 2 * skin_mm(tie_params(recipe, params.infill, everything(), voxel).neck_mm, grid);
+  report.solid.neck_mm = 2 * skin_mm(neck_mm, grid);
   const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
   if (params.slabs) {
     out.stream = run("pieces", 1.0, [&](const Context& c) {
@@ -96,8 +97,10 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const std::vector<Sticks> sticks = sticks_of(out.parts, fills);
   const TieParams ties = tie_params(recipe, params.infill, out.body, voxel);
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
-    return trim(tie(params.steps ? raw : std::exchange(raw, {}), whole, body, ties, c), body, sticks, shell_mm, ties,
-                c);
+    Tied made = tie(params.steps ? raw : std::exchange(raw, {}), whole, body, ties, c);
+    made = trim(made, body, sticks, shell_mm, ties, c);
+    made.solid = narrowed(std::move(made.solid));
+    return made;
   });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
     return checked_and_mended(tied, body, fills, sticks, ties, recipe, params.fix, report, c);

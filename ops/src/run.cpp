@@ -200,6 +200,7 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
     TieParams around = ties;
     around.keep_out = capsules(shapes(out.drains));
     out.tied = trim(out.tied, body, sticks, shell_mm, around, context);
+    out.tied.solid = narrowed(std::move(out.tied.solid));
   }
   const Shape lumen = printed_lumen(distance_to(body), shell_mm);
   report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm(fills, limits), context);

@@ -97,10 +97,11 @@ struct SolidStream::Impl {
 
   void sweep(const TieParams& params, const Context& context) {
     PieceSweep pieces(grid, {.axis = plan.axis, .clean = params.clean});
-    PieceSweep necks(grid, {.axis = plan.axis, .below = -skin_mm(params.neck_mm, grid)});
+    PieceSweep necks(grid, {.axis = plan.axis, .skin_mm = skin_mm(params.neck_mm, grid)});
     for (std::size_t i = 0; i < measured.size(); ++i) {
       context.check();
-      const Solid body_here = body(i, 0, quiet(context)), solid = raw(body_here, quiet(context));
+      const int beyond = params.neck_mm > 0 ? 8 : 0;  // what a skin is judged by
+      const Solid body_here = body(i, beyond, quiet(context)), solid = raw(body_here, quiet(context));
       pieces.add(solid, range(i).low, range(i).high, nothing(), quiet(context));
       if (params.neck_mm > 0) {
         const Shape anchor = shell(distance_to(body_here), design.assembly.shell_mm);
@@ -181,7 +182,7 @@ struct SolidStream::Impl {
   Slab slab(std::size_t number, const Context& context) {
     Slab result{range(number), number, body(number, plan.margin_vox, quiet(context)), {}};
     context.check();
-    result.solid = flipped(raw(result.body, quiet(context)), found.flips);
+    result.solid = narrowed(flipped(raw(result.body, quiet(context)), found.flips));
     context.check();
     if (!measured[number]) measure(number, result, context);
     return result;

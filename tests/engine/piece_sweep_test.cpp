@@ -142,7 +142,7 @@ TEST(PieceSweep, tells_what_hangs_on_nothing) {
   const std::vector<Unreached> whole = unreached(solid, wall, {.neck_mm = 1.6});
   ASSERT_EQ(whole.size(), 2U);
   for_cuts([&](int axis, int thickness) {
-    const PieceSweep::Result got = swept(solid, axis, thickness, {.below = -skin_mm(1.6, grid)}, wall);
+    const PieceSweep::Result got = swept(solid, axis, thickness, {.skin_mm = skin_mm(1.6, grid)}, wall);
     std::vector<Vec3d> loose;
     for (std::size_t i = 0; i < got.held.size(); ++i)
       if (!got.held[i]) loose.push_back(got.left.material[i].sample_mm);

@@ -12,6 +12,8 @@
 #include "fibrolite/pieces.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
+#include "fibrolite/to_solid.h"
+#include "models.h"
 
 namespace fibrolite {
 namespace {
@@ -54,6 +56,20 @@ TEST(Assemble, a_sphere_without_fill_is_its_shell) {
   const Pieces found = pieces(solid);
   EXPECT_EQ(found.material.size(), 1U);
   EXPECT_EQ(found.cavities.size(), 1U);
+}
+
+/// At every voxel, also where rounding would have what is deeper than the shell by the band a little less deep.
+TEST(Assemble, what_is_far_from_a_face_is_no_active_voxel) {
+  const double edge = 8, shell_mm = 1;
+  const Mesh mesh = testing::cube(edge);
+  for (const double voxel : {0.1, 0.0875, 0.075, 0.0625, 0.05, 0.04}) {
+    const Solid body = to_solid(mesh, {.grid = {.voxel_mm = voxel}, .inside_band_mm = shell_mm}).solid;
+    const Solid solid = realize(shell(distance_to(body), shell_mm), body);
+    const double faces = 6 * (edge * edge + (edge - 2) * (edge - 2)) / (voxel * voxel), band = 6;
+    const double share = static_cast<double>(solid.active_voxels()) / (band * faces);
+    EXPECT_GT(share, 0.8) << voxel;  // five samples of six where faces lie on samples
+    EXPECT_LT(share, 1.05) << voxel;
+  }
 }
 
 TEST(Assemble, no_sheet_or_pinhole_where_a_fill_meets_the_shell) {

@@ -10,6 +10,9 @@ namespace fibrolite {
 struct Grid {
   double voxel_mm = 0.25;  ///< Voxel edge, mm; > 0.
   float band_vox = 3;      ///< Half width of the narrow band, voxels; 2 or more.
+  /// How deep values are told inside, voxels; less than the band: as deep as that. What lies between the two is no
+  /// active voxel.
+  float inside_vox = 0;
   friend constexpr bool operator==(const Grid&, const Grid&) = default;
 };
 

@@ -31,13 +31,14 @@ class PieceSweep {
   struct Params {
     int axis = 2;          ///< Along which the slabs follow each other.
     bool falling = false;  ///< From high to low.
-    double below = 0;      ///< Material is what reads less than this, mm; 0 or negative, within the band.
+    double skin_mm = 0;    ///< How much is taken off the material first (reach.h).
     CleanParams clean{.drop_below_vox = 0, .fill_below_vox = 0};  ///< In several slabs up to 512, a block.
   };
   PieceSweep(Grid grid, const Params& params);
   /// The next slab: the blocks of 8 with low <= sample[axis] < high; both multiples of 8, each slab next to the one
-  /// before. What `solid` holds beyond is not looked at. Pieces with a sample where `anchor` is negative are
-  /// held. Cost: as pieces(), plus the slab's last layer of samples in memory.
+  /// before. What `solid` holds beyond is not looked at, but for the two layers of samples that a skin is judged by.
+  /// Pieces with a sample where `anchor` is negative are held. Cost: as pieces(), plus the slab's last layer of samples
+  /// in memory.
   void add(const Solid& solid, int low, int high, const Shape& anchor = nothing(), const Context& context = {});
   /// The next slabs, without an anchor, as many at once as there are threads.
   void add(const Solid& solid, const std::vector<SampleRange>& ranges, const Context& context = {});

@@ -9,9 +9,9 @@
 namespace fibrolite {
 
 /// Sample `shape` inside `region_mm` (it must lie wholly in there; what sticks out is cut flat). Blocks that its bound
-/// shows to be far from the surface are not evaluated. Values beyond the band are clamped, exact zeros nudged by 1e-3
-/// voxel to the outside (a zero at a sample makes degenerate triangles). Cost: O(blocks near the surface), parallel;
-/// the same bits on any number of threads.
+/// shows to be far from the surface are not evaluated. Values beyond the grid's reach are clamped, exact zeros nudged
+/// by 1e-3 voxel to the outside (a zero at a sample makes degenerate triangles). Cost: O(blocks near the surface),
+/// parallel; the same bits on any number of threads.
 /// @throws Error BadRecipe: voxel not positive; Cancelled.
 [[nodiscard]] Solid realize(const Shape& shape, const Box3d& region_mm, Grid grid, const Context& context = {});
 

@@ -41,6 +41,10 @@ class Solid {
   std::shared_ptr<const Impl> impl_;
 };
 
+/// The same with no value inside deeper than the band: a level set as others know it (Grid::inside_vox).
+/// Cost: O(leaves), and a copy if something else holds the grid; none if no value was told deeper.
+[[nodiscard]] Solid narrowed(Solid solid);
+
 /// The solid's distance as a shape. A block on the solid's own lattice is copied, any other point is interpolated.
 [[nodiscard]] Shape distance_to(const Solid& solid);
 
