@@ -96,8 +96,8 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const std::vector<Sticks> sticks = sticks_of(out.parts, fills);
   const TieParams ties = tie_params(recipe, params.infill, out.body, voxel);
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
-    return trim(tie(params.steps ? raw : std::exchange(raw, {}), whole, body, ties, c), body, sticks, shell_mm, ties,
-                c);
+    return trim(tie(params.steps ? raw : std::exchange(raw, {}), whole, body, ties, c), whole, body, sticks, shell_mm,
+                ties, c);
   });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
     return checked_and_mended(tied, body, fills, sticks, ties, recipe, params.fix, report, c);
