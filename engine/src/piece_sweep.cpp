@@ -279,6 +279,15 @@ struct PieceSweep::Impl {
   std::map<std::pair<int, int>, Face> faces, first_layer;
 };
 
+bool Flips::holds(Vec3i sample) const {
+  const Vec3i origin{sample.x & ~7, sample.y & ~7, sample.z & ~7};
+  const auto found = std::lower_bound(blocks.begin(), blocks.end(), origin,
+                                      [](const Block& block, Vec3i at) { return key(block.origin) < key(at); });
+  if (found == blocks.end() || found->origin != origin) return false;
+  const auto word = static_cast<std::size_t>(sample.x & 7);
+  return found->tile || (found->which[word] >> (8 * (sample.y & 7) + (sample.z & 7)) & 1U) != 0;
+}
+
 PieceSweep::PieceSweep(Grid grid, const Params& params) : impl_(std::make_shared<Impl>(grid, params)) {}
 
 void PieceSweep::add(const Solid& solid, int low, int high, const Shape& anchor, const Context& context) {

@@ -272,6 +272,8 @@ float Solid::distance(Vec3d p) const {
   return openvdb::tools::BoxSampler::sample(impl_->grid->tree(), openvdb::Vec3d(p.x * scale, p.y * scale, p.z * scale));
 }
 
+float Solid::at(Vec3i sample) const { return impl_->grid->tree().getValue({sample.x, sample.y, sample.z}); }
+
 Shape distance_to(const Solid& solid) { return Shape(std::make_shared<const SolidDistance>(solid)); }
 
 Solid narrowed(Solid solid) {

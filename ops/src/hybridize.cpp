@@ -98,7 +98,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const TieParams ties = tie_params(recipe, params.infill, out.body, voxel);
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
     Tied made = tie(params.steps ? raw : std::exchange(raw, {}), whole, body, ties, c);
-    made = trim(made, body, sticks, shell_mm, ties, c);
+    made = trim(std::move(made), whole, body, sticks, shell_mm, ties, c);
     made.solid = narrowed(std::move(made.solid));
     return made;
   });

@@ -36,9 +36,7 @@ void add_balls(const std::vector<Spot>& spots, bool wall, const MendParams& para
 }  // namespace
 
 Shape with_mends(const Shape& whole, const Shape& body, const Mended& m) {
-  Shape result = whole;
-  if (!m.tied.removed.empty()) result = subtract(result, capsules(m.tied.removed));
-  if (!m.tied.struts.empty()) result = unite({result, intersect({body, capsules(m.tied.struts)})});
+  Shape result = with_ties(whole, body, m.tied.changes);
   if (!m.thickened.empty()) result = unite({result, intersect({body, capsules(m.thickened)})});
   if (!m.drains.empty()) result = subtract(result, capsules(shapes(m.drains)));
   return result;

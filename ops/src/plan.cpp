@@ -86,6 +86,15 @@ double fixed_bytes(const Mesh& model) { return 50e6 + 300.0 * static_cast<double
 /// Of the proxy's finite elements, before there is a voxel.
 double deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 240e6 : 0; }
 
+/// Of what is known along sticks while they are swept (StickSweep): 16 to a cell, and eight nodes.
+double sticks_bytes(const Mesh& model, const Recipe& recipe, InfillKind infill) {
+  constexpr double bytes_a_cell = 16 * 80 + 8 * 120;
+  const TcsParams tcs = sized(recipe.tcs);
+  if (tcs.form == TcsForm::Sheet || (infill != InfillKind::Tcs && infill != InfillKind::Hybrid)) return 0;
+  const CellEdges& cell = tcs.cell_mm;
+  return bytes_a_cell * std::abs(signed_volume(model)) / (cell.x * cell.y * cell.z);
+}
+
 /// Of the layers of a surface that are worked on at once: eight of some 100 bytes a vertex.
 double layers_bytes(double triangles_a_layer) { return 8 * 50 * triangles_a_layer; }
 
@@ -201,7 +210,8 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
            sum[static_cast<std::size_t>(std::max(from - margin, 0))];
   };
   plan.memory_bytes = fixed_bytes(model) + deciding_bytes(infill);
-  const double fixed = fixed_bytes(model) + (needs.surface ? layers_bytes(largest_layer) : 0);
+  const double fixed =
+      fixed_bytes(model) + sticks_bytes(model, recipe, infill) + (needs.surface ? layers_bytes(largest_layer) : 0);
   plan.borders.push_back(8 * p.first);
   for (int from = 0; from < count;) {
     int to = from + 1;

@@ -199,7 +199,11 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
     out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
     TieParams around = ties;
     around.keep_out = capsules(shapes(out.drains));
-    out.tied = trim(out.tied, body, sticks, shell_mm, around, context);
+    const Solid& solid = out.tied.solid;  // from here on the whole
+    Tied rest{.solid = solid, .left = out.tied.left, .unreached = out.tied.unreached};
+    rest = trim(std::move(rest), distance_to(solid), body, sticks, shell_mm, around, context);
+    out.tied.dangling = 0;  // counted again
+    out.tied = and_then(out.tied, std::move(rest));
     out.tied.solid = narrowed(std::move(out.tied.solid));
   }
   const Shape lumen = printed_lumen(distance_to(body), shell_mm);
@@ -296,8 +300,8 @@ std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid&
     add("fill_" + std::to_string(i), clip({made.parts.parts[i].region(), fills[i].shape}, params));
   }
   for (std::size_t i = 0; i < made.joints.size(); ++i) add("joint_" + std::to_string(i), made.joints[i].shape);
-  if (!mended.tied.removed.empty()) add("removed", capsules(mended.tied.removed));
-  if (!mended.tied.struts.empty()) add("ties", capsules(mended.tied.struts));
+  if (const auto removed = mended.tied.removed(); !removed.empty()) add("removed", capsules(removed));
+  if (const auto struts = mended.tied.struts(); !struts.empty()) add("ties", capsules(struts));
   if (!mended.thickened.empty()) add("thickened", capsules(mended.thickened));
   if (!mended.drains.empty()) add("drains", capsules(shapes(mended.drains)));
   // What cleaning changed: material that went, void that was filled.

@@ -115,7 +115,7 @@ void report_solid(const Tied& tied, const std::vector<Fill>& fills, double body_
   out.pieces = static_cast<std::int64_t>(tied.left.material.size());
   out.cavities = static_cast<std::int64_t>(tied.left.cavities.size());
   for (const Piece& cavity : tied.left.cavities) out.cavity_volume_mm3 += cavity.volume_mm3;
-  out.ties = static_cast<std::int64_t>(tied.struts.size());
+  out.ties = static_cast<std::int64_t>(tied.struts().size());
   out.necks_thickened = tied.necks;
   out.tips_tied = tied.tips_tied;
   out.tips_removed = tied.tips_removed;

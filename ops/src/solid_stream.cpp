@@ -2,16 +2,18 @@
 #include "fibrolite/ops/solid_stream.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "fibrolite/error.h"
+#include "fibrolite/ops/trim.h"
 #include "fibrolite/piece_sweep.h"
 #include "fibrolite/reach.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
-#include "fibrolite/winding.h"
 #include "print_limits.h"
 #include "run.h"
 
@@ -32,6 +34,7 @@ struct SolidStream::Impl {
         grid(g),
         voxels(model, {.grid = grid, .inside_band_mm = design.assembly.shell_mm}, context) {
     for (const Part& part : design.parts.parts) regions.push_back(part.region());
+    sticks = sticks_of(design.parts, design.fills);
     sums.resize(regions.size());
     measured.resize(plan.borders.size() - 1, false);
   }
@@ -58,10 +61,26 @@ struct SolidStream::Impl {
     return realize(with_mends(over(b), b, made), body, context);
   }
 
+  /// One piece, without ends of sticks in the void.
+  void make(const Context& context) {
+    const TieParams params = tie_params(design.recipe, design.infill, everything(), grid.voxel_mm);
+    const Trimmed solid{[&] {
+                          std::vector<LooseEnd> all;
+                          for (StickSweep& part : along_sticks) {
+                            const auto ends = part.finish(found.flips, surroundings(context));
+                            all.insert(all.end(), ends.begin(), ends.end());
+                          }
+                          return all;
+                        },
+                        surroundings(context), [&] { make_one_piece(params, context); }};
+    solid.remake();
+    trim(made.tied, solid, grid.voxel_mm, params);
+  }
+
   /// Loose pieces are tied, then what hangs on too thin a neck; specks and micro-voids are noted. As tie() does, but
   /// each loose thing is looked at with what lies around it alone.
-  void make_one_piece(const Context& context) {
-    const TieParams params = tie_params(design.recipe, design.infill, everything(), grid.voxel_mm);
+  void make_one_piece(const TieParams& params, const Context& context) {
+    made.tied.changes.emplace_back();
     for (int round = 0;; ++round) {
       sweep(params, context);
       if (found.left.material.empty()) {
@@ -82,26 +101,19 @@ struct SolidStream::Impl {
     made.tied.dropped = found.dropped;
     made.tied.filled = found.filled;
     made.tied.left = found.left;
-  }
-
-  /// Of the solid as a function, its body exact: no slab would hold whole sticks.
-  void count_loose_ends(const Mesh& model, const Context& context) {
-    const std::vector<Sticks> parts = sticks_of(design.parts, design.fills);
-    if (parts.empty()) return;
-    const Shape exact = distance_to(WindingTree(model)), solid = with_mends(over(exact), exact, made);
-    for (const Sticks& sticks : parts) {
-      made.tied.dangling += static_cast<std::int64_t>(
-          loose_ends(sticks, exact, design.assembly.shell_mm, solid, grid.voxel_mm, quiet(context)).size());
-    }
+    if (made.tied.changes.back().struts.empty()) made.tied.changes.pop_back();
   }
 
   void sweep(const TieParams& params, const Context& context) {
     PieceSweep pieces(grid, {.axis = plan.axis, .clean = params.clean});
     PieceSweep necks(grid, {.axis = plan.axis, .skin_mm = skin_mm(params.neck_mm, grid)});
+    along_sticks.clear();
+    for (const Sticks& part : sticks) along_sticks.emplace_back(part, design.assembly.shell_mm, grid.voxel_mm);
     for (std::size_t i = 0; i < measured.size(); ++i) {
       context.check();
       const int beyond = params.neck_mm > 0 ? 8 : 0;  // what a skin is judged by
       const Solid body_here = body(i, beyond, quiet(context)), solid = raw(body_here, quiet(context));
+      for (StickSweep& part : along_sticks) part.add(body_here, solid, range(i), quiet(context));
       pieces.add(solid, range(i).low, range(i).high, nothing(), quiet(context));
       if (params.neck_mm > 0) {
         const Shape anchor = shell(distance_to(body_here), design.assembly.shell_mm);
@@ -144,17 +156,43 @@ struct SolidStream::Impl {
     return result;
   }
 
+  /// Boxes whose middles lie near each other share a window.
+  [[nodiscard]] Surroundings surroundings(const Context& context) const {
+    return
+        [this, context](const std::vector<Box3d>& boxes, const std::function<void(std::size_t, const Solid&)>& visit) {
+          constexpr double near_vox = 96;
+          std::map<std::array<int, 3>, std::vector<std::size_t>> groups;
+          for (std::size_t i = 0; i < boxes.size(); ++i) {
+            const Vec3d middle = boxes[i].center();
+            const auto cell = [&](double v) { return static_cast<int>(std::floor(v / (near_vox * grid.voxel_mm))); };
+            groups[{cell(middle.x), cell(middle.y), cell(middle.z)}].push_back(i);
+          }
+          for (const auto& [place, group] : groups) {
+            context.check();
+            Box3d all;
+            for (const std::size_t i : group) {
+              all.include(boxes[i].min);
+              all.include(boxes[i].max);
+            }
+            const auto low = [&](double v) { return static_cast<int>(std::floor(v / grid.voxel_mm)); };
+            const SampleBox samples{{low(all.min.x), low(all.min.y), low(all.min.z)},
+                                    {low(all.max.x) + 1, low(all.max.y) + 1, low(all.max.z) + 1}};
+            const Window here = window(samples, 0, context);
+            for (const std::size_t i : group) visit(i, here.solid);
+          }
+        };
+  }
+
   /// A strut from each loose piece to the nearest other.
   bool tie_loose(const TieParams& params, const Context& context) {
-    const std::size_t before = made.tied.struts.size();
     std::vector<Capsule> struts;
     for (std::size_t i = 1; i < found.left.material.size(); ++i) {
       const Window around = window(found.boxes[i], params.reach_mm, context);
       const auto gap = gap_from(around.solid, found.left.material[i].sample_mm, params.reach_mm, quiet(context));
       if (gap) struts.push_back(strut(*gap, params.strut_mm));
     }
-    made.tied.struts.insert(made.tied.struts.end(), struts.begin(), struts.end());
-    return made.tied.struts.size() > before;
+    keep(struts);
+    return !struts.empty();
   }
 
   /// A strut along each neck that is too thin. What leaves the window counts as reached: only what the sweep found,
@@ -175,8 +213,13 @@ struct SolidStream::Impl {
       }
     }
     made.tied.necks += static_cast<std::int64_t>(struts.size());
-    made.tied.struts.insert(made.tied.struts.end(), struts.begin(), struts.end());
+    keep(struts);
     return !struts.empty();
+  }
+
+  void keep(const std::vector<Capsule>& struts) {
+    std::vector<Capsule>& all = made.tied.changes.back().struts;
+    all.insert(all.end(), struts.begin(), struts.end());
   }
 
   Slab slab(std::size_t number, const Context& context) {
@@ -230,11 +273,6 @@ struct SolidStream::Impl {
       report.print.found = summed(all, design.recipe.verify.up, node_mm(design.fills, limits));
       report.print.checked = true;
     }
-    if (made.tied.dangling > 0) {
-      report.warnings.push_back(
-          std::to_string(made.tied.dangling) +
-          " stick ends hang free: they are only tied or removed if the whole solid fits into memory");
-    }
   }
 
   const Design design;
@@ -242,8 +280,10 @@ struct SolidStream::Impl {
   const Grid grid;
   const MeshVoxels voxels;
   std::vector<Shape> regions;
-  Mended made;                        ///< The ties; the solid stays empty.
-  PieceSweep::Result found, hanging;  ///< Pieces; and what a skin of half a neck cuts off.
+  std::vector<Sticks> sticks;
+  Mended made;                           ///< The ties; the solid stays empty.
+  PieceSweep::Result found, hanging;     ///< Pieces; and what a skin of half a neck cuts off.
+  std::vector<StickSweep> along_sticks;  ///< One for each of sticks.
   std::vector<bool> measured;
   std::vector<PartSums> sums;
   double body_vox = 0, solid_vox = 0;
@@ -267,8 +307,7 @@ SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid 
   auto impl = std::make_shared<SolidStream::Impl>(model, std::move(design), plan, grid, context.part(0, 0.3, "body"));
   const std::vector<std::string>& repairs = impl->voxels.repairs();
   report.model.repairs.insert(report.model.repairs.end(), repairs.begin(), repairs.end());
-  impl->make_one_piece(context.part(0.3, 0.95, "one piece"));
-  impl->count_loose_ends(model, context);
+  impl->make(context.part(0.3, 0.95, "one piece"));
   return SolidStream(std::move(impl));
 }
 

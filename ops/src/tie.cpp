@@ -12,11 +12,12 @@ namespace fibrolite {
 Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams& params, const Context& context) {
   constexpr int rounds = 3;  // a strut may end on another loose piece, which the next round ties
   Tied result;
+  TieChange change;
   CleanResult cleaned = clean(std::move(solid), params.clean, context);
-  const auto add = [&](const Gap& gap) { result.struts.push_back(strut(gap, params.strut_mm)); };
+  const auto add = [&](const Gap& gap) { change.struts.push_back(strut(gap, params.strut_mm)); };
   const auto make = [&] {
-    const Shape struts = subtract(intersect({distance_to(body), capsules(result.struts)}), params.keep_out);
-    cleaned = clean(realize(unite({assembled, struts}), body, context), params.clean, context);
+    const Shape changed = with_ties(assembled, distance_to(body), {change}, params.keep_out);
+    cleaned = clean(realize(changed, body, context), params.clean, context);
   };
   for (int round = 0; round < rounds && cleaned.left.material.size() > 1; ++round) {
     const auto found = gaps(cleaned.solid, params.reach_mm, context);
@@ -28,16 +29,17 @@ Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams
     const bool last = round == rounds;
     const auto found =
         unreached(cleaned.solid, params.anchor, {params.neck_mm, last ? 0 : params.reach_mm, params.keep_out}, context);
-    const std::size_t before = result.struts.size();
+    const std::size_t before = change.struts.size();
     for (const Unreached& one : found)
       if (one.way) add(*one.way);
-    if (result.struts.size() == before) {
+    if (change.struts.size() == before) {
       for (const Unreached& one : found) result.unreached.push_back(one.piece);
       break;
     }
-    result.necks += static_cast<std::int64_t>(result.struts.size() - before);
+    result.necks += static_cast<std::int64_t>(change.struts.size() - before);
     make();
   }
+  if (!change.struts.empty()) result.changes.push_back(std::move(change));
   result.solid = std::move(cleaned.solid);
   result.dropped = cleaned.dropped;
   result.filled = cleaned.filled;
@@ -51,18 +53,43 @@ Capsule strut(const Gap& gap, double strut_mm) {
   return {gap.from_mm - root, gap.to_mm + root, 0.5 * strut_mm};
 }
 
-Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
-               const Context& context) {
-  Tied now = tie(solid, distance_to(solid), body, params, context);
+Shape with_ties(const Shape& whole, const Shape& body, const std::vector<TieChange>& changes, const Shape& keep_out) {
+  Shape result = whole;
+  for (const TieChange& change : changes) {
+    if (!change.removed.empty()) result = subtract(result, capsules(change.removed));
+    if (!change.struts.empty())
+      result = unite({result, subtract(intersect({body, capsules(change.struts)}), keep_out)});
+  }
+  return result;
+}
+
+Tied and_then(const Tied& before, Tied now) {
+  now.changes.insert(now.changes.begin(), before.changes.begin(), before.changes.end());
   now.dropped += before.dropped;
   now.filled += before.filled;
   now.necks += before.necks;
-  now.tips_tied = before.tips_tied;
-  now.tips_removed = before.tips_removed;
-  now.dangling = before.dangling;
-  now.struts.insert(now.struts.begin(), before.struts.begin(), before.struts.end());
-  now.removed = before.removed;
+  now.tips_tied += before.tips_tied;
+  now.tips_removed += before.tips_removed;
+  now.dangling += before.dangling;
   return now;
 }
+
+Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
+               const Context& context) {
+  return and_then(before, tie(solid, distance_to(solid), body, params, context));
+}
+
+namespace {
+
+std::vector<Capsule> gathered(const std::vector<TieChange>& changes, std::vector<Capsule> TieChange::*list) {
+  std::vector<Capsule> all;
+  for (const TieChange& change : changes) all.insert(all.end(), (change.*list).begin(), (change.*list).end());
+  return all;
+}
+
+}  // namespace
+
+std::vector<Capsule> Tied::struts() const { return gathered(changes, &TieChange::struts); }
+std::vector<Capsule> Tied::removed() const { return gathered(changes, &TieChange::removed); }
 
 }  // namespace fibrolite

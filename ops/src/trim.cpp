@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -57,55 +59,79 @@ std::optional<Vec3d> in_sight(const LooseEnd& end, const Solid& solid, const Tie
   return best;
 }
 
+/// What is in sight of each end.
+std::vector<std::optional<Vec3d>> holds(const std::vector<LooseEnd>& ends, const Surroundings& around, double voxel_mm,
+                                        const TieParams& params) {
+  std::vector<Box3d> boxes;
+  for (const LooseEnd& end : ends)
+    boxes.push_back(Box3d{end.end_mm, end.end_mm}.grown(norm(end.end_mm - end.held_mm) + 2 * voxel_mm));
+  std::vector<std::optional<Vec3d>> found(ends.size());
+  around(boxes, [&](std::size_t i, const Solid& solid) { found[i] = in_sight(ends[i], solid, params); });
+  return found;
+}
+
+/// Takes off what has no hold, and ties the others to it.
+TieChange change(const std::vector<LooseEnd>& ends, std::vector<std::optional<Vec3d>> hold, double voxel_mm,
+                 const TieParams& params) {
+  TieChange made;
+  // An end cannot be tied to what is removed.
+  std::vector<bool> counted(ends.size(), false);
+  for (bool changed = true; changed;) {
+    changed = false;
+    const Shape away = capsules(made.removed);
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      if (counted[i] || (hold[i] && away(*hold[i]) > 0)) continue;
+      hold[i].reset();
+      counted[i] = changed = true;
+      cover(ends[i], voxel_mm, made.removed);
+    }
+  }
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    if (!hold[i]) continue;
+    const Vec3d root = 0.5 * params.strut_mm * normalized(*hold[i] - ends[i].end_mm);
+    made.struts.push_back({ends[i].end_mm, *hold[i] + root, 0.5 * params.strut_mm});
+  }
+  return made;
+}
+
 }  // namespace
 
-Tied trim(const Tied& tied, const Solid& body, const std::vector<Sticks>& sticks, double shell_mm,
-          const TieParams& params, const Context& context) {
-  Tied out = tied;
-  const double voxel = body.grid().voxel_mm;
-  const Shape b = distance_to(body);
+void trim(Tied& tied, const Trimmed& solid, double voxel_mm, const TieParams& params) {
   for (int round = 0;; ++round) {
-    const Solid solid = out.solid;
-    std::vector<LooseEnd> ends;
-    for (const Sticks& part : sticks) {
-      const auto found = loose_ends(part, b, shell_mm, solid, context);
-      ends.insert(ends.end(), found.begin(), found.end());
-    }
-    out.dangling = static_cast<std::int64_t>(ends.size());
-    if (ends.empty() || round == rounds) return out;
-
-    std::vector<std::optional<Vec3d>> hold;
-    for (const LooseEnd& end : ends) hold.push_back(in_sight(end, solid, params));
-    // An end cannot be tied to what is removed.
-    std::vector<Capsule> gone;
-    std::vector<bool> counted(ends.size(), false);
-    for (bool changed = true; changed;) {
-      changed = false;
-      const Shape away = capsules(gone);
-      for (std::size_t i = 0; i < ends.size(); ++i) {
-        if (counted[i] || (hold[i] && (gone.empty() || away(*hold[i]) > 0))) continue;
-        hold[i].reset();
-        counted[i] = changed = true;
-        cover(ends[i], voxel, gone);
-      }
-    }
-    std::vector<Capsule> struts;
-    for (std::size_t i = 0; i < ends.size(); ++i) {
-      if (!hold[i]) continue;
-      const Vec3d root = 0.5 * params.strut_mm * normalized(*hold[i] - ends[i].end_mm);
-      struts.push_back({ends[i].end_mm, *hold[i] + root, 0.5 * params.strut_mm});
-    }
-    const auto tied_now = static_cast<std::int64_t>(struts.size());
-    out.tips_tied += tied_now;
-    out.tips_removed += static_cast<std::int64_t>(ends.size()) - tied_now;
-
-    Shape changed = distance_to(solid);
-    if (!gone.empty()) changed = subtract(changed, capsules(gone));
-    if (!struts.empty()) changed = unite({changed, subtract(intersect({b, capsules(struts)}), params.keep_out)});
-    out.removed.insert(out.removed.end(), gone.begin(), gone.end());
-    out.struts.insert(out.struts.end(), struts.begin(), struts.end());
-    out = tie_again(out, realize(changed, body, context), body, params, context);
+    const std::vector<LooseEnd> ends = solid.loose_ends();
+    tied.dangling = static_cast<std::int64_t>(ends.size());
+    if (ends.empty() || round == rounds) return;
+    TieChange made = change(ends, holds(ends, solid.around, voxel_mm, params), voxel_mm, params);
+    const auto tied_now = static_cast<std::int64_t>(made.struts.size());
+    tied.tips_tied += tied_now;
+    tied.tips_removed += static_cast<std::int64_t>(ends.size()) - tied_now;
+    tied.changes.push_back(std::move(made));
+    solid.remake();
   }
+}
+
+Tied trim(Tied tied, const Shape& whole, const Solid& body, const std::vector<Sticks>& sticks, double shell_mm,
+          const TieParams& params, const Context& context) {
+  const auto ends = [&] {
+    std::vector<LooseEnd> all;
+    for (const Sticks& part : sticks) {
+      const auto found = loose_ends(part, body, shell_mm, tied.solid, context);
+      all.insert(all.end(), found.begin(), found.end());
+    }
+    return all;
+  };
+  const auto around = [&](const std::vector<Box3d>& boxes,
+                          const std::function<void(std::size_t, const Solid&)>& visit) {
+    surroundings(tied.solid)(boxes, visit);
+  };
+  const auto remake = [&] {
+    tied.solid = {};
+    tied.dropped = tied.filled = 0;  // found again
+    const Solid solid = realize(with_ties(whole, distance_to(body), tied.changes, params.keep_out), body, context);
+    tied = tie_again(tied, solid, body, params, context);
+  };
+  trim(tied, {ends, around, remake}, body.grid().voxel_mm, params);
+  return tied;
 }
 
 }  // namespace fibrolite

@@ -152,6 +152,33 @@ TEST(Generate, LessMemoryGivesTheSameFilesSlabBySlab) {
   EXPECT_EQ(names_in(slabs.path()).size(), 6U);  // nothing stays behind
 }
 
+TEST(Generate, LessMemoryTiesAndRemovesTheSameStickEnds) {
+  const TempDir whole, slabs;
+  const std::string cut = R"(partition.overrides={"cuts":[{"point_mm":[0,0,20],"normal":[0.1,0.05,1]}],)"
+                          R"("parts":[{"id":0,"infill":"tcs"},{"id":1,"infill":"shell"}]})";
+  const auto generated = [&](const TempDir& folder, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"generate", asset("rounded_box"),
+                                       "--size",   "40",
+                                       "--voxel",  "0.15",
+                                       "--set",    cut,
+                                       "--set",    "joint.enabled=false",
+                                       "-o",       folder / "part.stl"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  const std::string memory = "290M";
+  EXPECT_THAT(generated(slabs, {"--max-memory", memory, "--dry-run"}).out, HasSubstr("slabs"));
+  generated(whole, {});
+  generated(slabs, {"--max-memory", memory});
+  EXPECT_TRUE(content(whole / "part.stl") == content(slabs / "part.stl"));
+  const json a = report_in(whole / "part.report.json"), b = report_in(slabs / "part.report.json");
+  EXPECT_GE(a["solid"]["tips_removed"], 10);
+  EXPECT_GE(a["solid"]["tips_tied"], 1);
+  EXPECT_EQ(a["solid"]["dangling"], 0);
+  for (const char* block : {"model", "parts", "interfaces", "solid", "print", "mesh", "warnings"})
+    EXPECT_EQ(a[block], b[block]) << block;
+}
+
 TEST(Generate, ADryRunSaysWhatTheRunWillTake) {
   const auto said = [](const std::string& voxel, const std::string& unit) {
     const TempDir folder;

@@ -160,5 +160,21 @@ TEST(PieceSweep, boxes_hold_their_pieces) {
   });
 }
 
+TEST(Flips, hold_the_samples_that_change) {
+  const Solid solid = make(clutter(5));
+  const Flips flips = swept(solid, 2, 24, {.clean = {.drop_below_vox = 400, .fill_below_vox = 400}}).flips;
+  ASSERT_FALSE(flips.blocks.empty());
+  const Solid changed = flipped(solid, flips);
+  int held = 0;
+  for (int x = low; x < high; ++x)
+    for (int y = low; y < high; ++y)
+      for (int z = low; z < high; ++z) {
+        const bool differs = (solid.at({x, y, z}) < 0) != (changed.at({x, y, z}) < 0);
+        ASSERT_EQ(flips.holds({x, y, z}), differs) << x << " " << y << " " << z;
+        held += differs ? 1 : 0;
+      }
+  EXPECT_GT(held, 50);
+}
+
 }  // namespace
 }  // namespace fibrolite

@@ -43,6 +43,14 @@ TEST_P(StickVolume, is_within_a_percent_from_three_voxels_up) {
 }
 INSTANTIATE_TEST_SUITE_P(Radii, StickVolume, ::testing::Values(1.5, 2.0, 3.0, 5.0));
 
+TEST(Solid, a_sample_is_the_distance_there) {
+  const Solid solid = realize(sphere({0, 0, 0}, 8), box, {.voxel_mm = 0.25});
+  EXPECT_NEAR(solid.at({33, 0, 0}), 0.25, 1e-6);
+  EXPECT_NEAR(solid.at({0, -31, 0}), -0.25, 1e-6);
+  EXPECT_EQ(solid.at({0, 0, 0}), -0.75F);  // the band
+  EXPECT_EQ(solid.at({1000, 0, 0}), 0.75F);
+}
+
 TEST(SolidDistance, agrees_with_its_shape_between_samples) {
   const Shape truth = sphere({0, 0, 0}, 8);
   const Shape shape = distance_to(realize(truth, box, {.voxel_mm = 0.25}));

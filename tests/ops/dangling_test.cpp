@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <set>
+#include <string>
 #include <tuple>
 
 #include "fibrolite/ops/infill/tcs.h"
@@ -23,13 +24,16 @@ Sticks crystal_sticks(const Shape& region) {
       params.ball_mm, box, region};
 }
 
+/// A body to the depth that the shell needs, 0.2 mm a voxel.
+Solid full() { return realize(cuboid(box), box.grown(1), {.voxel_mm = 0.2, .band_vox = 6}); }
+
 /// A cube with a shell; crystal below the plane, nothing above it, and between them a layer or none.
 std::size_t count(double plane_mm, bool layer) {
   const Shape body = cuboid(box), low = half_space({0, 0, plane_mm}, {0, 0, 1});
   std::vector<Shape> material{subtract(body, offset(body, -shell_mm)), intersect({crystal(params), low})};
   if (layer) material.push_back(cuboid({{-9, -9, plane_mm - 0.4}, {9, 9, plane_mm + 0.8}}));
   const Solid solid = realize(intersect({body, unite(material)}), box.grown(1), {.voxel_mm = 0.2});
-  return loose_ends(crystal_sticks(low), body, shell_mm, solid).size();
+  return loose_ends(crystal_sticks(low), full(), shell_mm, solid).size();
 }
 
 TEST(Sticks, each_once_four_to_a_node) {
@@ -51,7 +55,7 @@ TEST(Dangling, none_where_every_stick_ends_in_the_shell) {
   const Solid solid =
       realize(intersect({cuboid(box), unite({subtract(cuboid(box), offset(cuboid(box), -shell_mm)), crystal(params)})}),
               box.grown(1), {.voxel_mm = 0.2});
-  EXPECT_TRUE(loose_ends(crystal_sticks(everything()), cuboid(box), shell_mm, solid).empty());
+  EXPECT_TRUE(loose_ends(crystal_sticks(everything()), full(), shell_mm, solid).empty());
 }
 
 /// A plane half way up the sticks leaves one free end for each stick it cuts inside the shell; a layer there takes
@@ -91,7 +95,7 @@ TEST(Dangling, ends_cut_at_a_slant_are_not_held_by_their_own_tips) {
   const Solid solid = realize(intersect({body, unite({subtract(body, offset(body, -shell_mm)),
                                                       intersect({crystal(params), offset(low, 0.2)})})}),
                               box.grown(1), {.voxel_mm = 0.2});
-  EXPECT_GE(loose_ends(crystal_sticks(low), body, shell_mm, solid).size(), cut.size());
+  EXPECT_GE(loose_ends(crystal_sticks(low), full(), shell_mm, solid).size(), cut.size());
 }
 
 TEST(Dangling, a_node_on_one_stick_is_an_end) {
@@ -107,7 +111,7 @@ TEST(Dangling, a_node_on_one_stick_is_an_end) {
                           for (const Capsule& s : list) visit(s);
                         },
                         0.8, box, everything()};
-    return loose_ends(sticks, body, shell_mm, solid(more));
+    return loose_ends(sticks, full(), shell_mm, solid(more));
   };
   const auto free = found({stick, absent}, nothing());
   ASSERT_EQ(free.size(), 1U);
@@ -116,6 +120,55 @@ TEST(Dangling, a_node_on_one_stick_is_an_end) {
   EXPECT_NEAR(free[0].held_mm.z, -8, 0.7);                     // the shell's inner face
   const Shape beam = capsule({-9, 0, 0.5}, {9, 0, 0.5}, 0.4);  // carries its head
   EXPECT_TRUE(found({stick}, beam).empty());
+}
+
+void expect_same(const std::vector<LooseEnd>& a, const std::vector<LooseEnd>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].end_mm, b[i].end_mm);
+    EXPECT_EQ(a[i].held_mm, b[i].held_mm);
+    EXPECT_EQ(a[i].radius_mm, b[i].radius_mm);
+    EXPECT_EQ(a[i].knob_mm, b[i].knob_mm);
+  }
+}
+
+/// Sticks over many borders, in a part that ends at a slant; a speck before one of its ends and pores in the middle of
+/// sticks, which cleaning takes away and fills.
+TEST(StickSweep, finds_in_slabs_what_it_finds_in_the_whole) {
+  const Shape low = half_space({0, 0, 0.75}, {0.3, 0.2, 1}), body = cuboid(box);
+  const Solid known = full();
+  const Solid raw = realize(intersect({body, unite({subtract(body, offset(body, -shell_mm)),
+                                                    intersect({crystal(params), offset(low, 0.2)})})}),
+                            known);
+  const auto before = loose_ends(crystal_sticks(low), known, shell_mm, raw);
+  ASSERT_GE(before.size(), 5U);
+  // The first end hides behind a speck.
+  const Vec3d out = normalized(before[0].end_mm - before[0].held_mm);
+  const Shape speck = sphere(before[0].end_mm + (before[0].radius_mm + 0.4) * out, 0.25);
+  std::vector<Capsule> pores;
+  each_stick(params, box, [&](const Capsule& s) {
+    const Vec3d middle = 0.5 * (s.a + s.b);
+    if (low(middle) < -1 && body(middle) < -3) pores.push_back({middle, middle, 0.2});
+  });
+  ASSERT_GE(pores.size(), 20U);
+  const Solid raw_here = realize(unite({subtract(distance_to(raw), capsules(pores)), speck}), known);
+  PieceSweep pieces(raw.grid(), {.clean = {}});
+  pieces.add(raw_here, -56, 56);
+  const Flips flips = pieces.finish().flips;
+  const Vec3d pore = (1 / 0.2) * pores[0].a;
+  ASSERT_TRUE(flips.holds({static_cast<int>(std::lround(pore.x)), static_cast<int>(std::lround(pore.y)),
+                           static_cast<int>(std::lround(pore.z))}));
+  const Solid clean = flipped(raw_here, flips);
+  const auto whole = loose_ends(crystal_sticks(low), known, shell_mm, clean);
+  ASSERT_GE(whole.size(), 5U);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int thickness : {8, 24, 40}) {
+      SCOPED_TRACE("axis " + std::to_string(axis) + ", slabs of " + std::to_string(thickness));
+      StickSweep sweep(crystal_sticks(low), shell_mm, raw.grid().voxel_mm);
+      for (int at = -56; at < 56; at += thickness) sweep.add(known, raw_here, {axis, at, at + thickness});
+      expect_same(sweep.finish(flips, surroundings(clean)), whole);
+    }
+  }
 }
 
 }  // namespace

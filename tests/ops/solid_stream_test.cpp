@@ -86,7 +86,11 @@ void expect_same_report(const Report& a, const Report& b) {
   EXPECT_EQ(a.solid.specks_removed, b.solid.specks_removed);
   EXPECT_EQ(a.solid.voids_filled, b.solid.voids_filled);
   EXPECT_EQ(a.solid.active_voxels, b.solid.active_voxels);
+  EXPECT_EQ(a.solid.necks_thickened, b.solid.necks_thickened);
+  EXPECT_EQ(a.solid.tips_tied, b.solid.tips_tied);
+  EXPECT_EQ(a.solid.tips_removed, b.solid.tips_removed);
   EXPECT_EQ(a.solid.dangling, b.solid.dangling);
+  EXPECT_EQ(a.warnings, b.warnings);
   EXPECT_EQ(a.solid.unreached, b.solid.unreached);
   EXPECT_EQ(a.print.checked, b.print.checked);
   expect_same(a.print.found.thin_walls, b.print.found.thin_walls);
@@ -104,10 +108,9 @@ void expect_same_report(const Report& a, const Report& b) {
   EXPECT_EQ(a.interfaces.size(), b.interfaces.size());
 }
 
-/// Returns the report of the whole.
-Report expect_same_in_slabs(const Mesh& mesh, const HybridizeParams& params, int axis, int thickness, bool falling) {
+void expect_same_in_slabs(const Outcome& whole, const Mesh& mesh, const HybridizeParams& params, int axis,
+                          int thickness, bool falling) {
   SCOPED_TRACE("axis " + std::to_string(axis) + ", slabs of " + std::to_string(thickness));
-  const Outcome whole = hybridized(mesh, params);
   HybridizeParams cut = params;
   cut.slabs = slabs_of(mesh, *params.voxel_mm, axis, thickness);
   Outcome streamed = hybridized(mesh, cut);
@@ -120,6 +123,12 @@ Report expect_same_in_slabs(const Mesh& mesh, const HybridizeParams& params, int
   }
   stream.finish(streamed.report);
   expect_same_report(streamed.report, whole.report);
+}
+
+/// Returns the report of the whole.
+Report expect_same_in_slabs(const Mesh& mesh, const HybridizeParams& params, int axis, int thickness, bool falling) {
+  const Outcome whole = hybridized(mesh, params);
+  expect_same_in_slabs(whole, mesh, params, axis, thickness, falling);
   return whole.report;
 }
 
@@ -144,6 +153,23 @@ TEST(SolidStream, ties_what_is_loose_as_the_whole_does) {
   const Report report = expect_same_in_slabs(mesh, params, 0, 16, false);
   EXPECT_GE(report.solid.ties, 2);
   EXPECT_EQ(report.solid.pieces, 1);
+}
+
+TEST(SolidStream, ties_and_removes_what_hangs_free_as_the_whole_does) {
+  // Crystal above a slanted plane, nothing below it and no joint between: sticks end in the void there.
+  const Mesh mesh = read_mesh(asset("rounded_box")).mesh;
+  HybridizeParams params = params_of(InfillKind::Hybrid, 0.5);
+  params.recipe.joint.enabled = false;
+  params.recipe.tcs.cell_mm = 7;
+  params.recipe.partition.overrides.cuts.push_back({{0, 0, 20}, {0.1, 0.05, 1}});
+  params.recipe.partition.overrides.parts = {{0, PartInfill::Shell}, {1, PartInfill::Tcs}};
+  const Outcome whole = hybridized(mesh, params);
+  ASSERT_GE(whole.report.solid.tips_tied, 5);
+  ASSERT_GE(whole.report.solid.tips_removed, 10);
+  EXPECT_EQ(whole.report.solid.dangling, 0);
+  EXPECT_EQ(whole.report.solid.pieces, 1);
+  expect_same_in_slabs(whole, mesh, params, 2, 16, false);  // a border through the ends, others through their sticks
+  expect_same_in_slabs(whole, mesh, params, 0, 40, true);
 }
 
 TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {

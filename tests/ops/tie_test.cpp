@@ -18,9 +18,10 @@ TEST(Tie, a_loose_ball_in_a_hollow_body_is_tied_to_the_wall_by_the_shortest_stru
   const Solid full = realize(body, box, grid);
   const Tied tied = tie(realize(whole, full), whole, full, {.strut_mm = 1, .reach_mm = 5});
   EXPECT_EQ(tied.left.material.size(), 1U);
-  ASSERT_EQ(tied.struts.size(), 1U);
-  EXPECT_NEAR(norm(tied.struts[0].b - tied.struts[0].a), 2 + 1, 0.8);  // gap of 2 mm, grown by a radius at both ends
-  const Vec3d middle = 0.5 * (tied.struts[0].a + tied.struts[0].b);
+  ASSERT_EQ(tied.struts().size(), 1U);
+  EXPECT_NEAR(norm(tied.struts()[0].b - tied.struts()[0].a), 2 + 1,
+              0.8);  // gap of 2 mm, grown by a radius at both ends
+  const Vec3d middle = 0.5 * (tied.struts()[0].a + tied.struts()[0].b);
   EXPECT_LT(norm(middle - Vec3d{7, 0, 0}), 1.2);  // ways within a voxel of the shortest are as good
   EXPECT_LT(tied.solid.distance(middle), 0);
   EXPECT_GT(tied.solid.distance({0, 0, 0}), 0);
@@ -41,7 +42,7 @@ TEST(Tie, specks_go_and_are_counted) {
   const Solid full = realize(body, box, grid);
   const Tied tied = tie(realize(whole, full), whole, full, {});
   EXPECT_EQ(tied.dropped, 1);
-  EXPECT_TRUE(tied.struts.empty());
+  EXPECT_TRUE(tied.struts().empty());
   EXPECT_EQ(tied.left.material.size(), 1U);
   EXPECT_GT(tied.solid.distance({0, 0, 0}), 0);
 }
@@ -68,12 +69,12 @@ TEST(Tie, what_hangs_on_thin_necks_gets_one_as_thick_as_asked_for) {
   ASSERT_EQ(unreached(raw, h.wall, {.neck_mm = 1.4}).size(), 1U);
   const Tied tied = tie(raw, h.whole, h.full, h.params);
   EXPECT_EQ(tied.necks, 1);
-  ASSERT_EQ(tied.struts.size(), 1U);
+  ASSERT_EQ(tied.struts().size(), 1U);
   EXPECT_EQ(tied.unreached.size(), 0U);
   EXPECT_EQ(tied.left.material.size(), 1U);
   EXPECT_EQ(unreached(tied.solid, h.wall, {.neck_mm = 1.4}).size(), 0U);
   // Beside one of the threads.
-  const Vec3d middle = 0.5 * (tied.struts[0].a + tied.struts[0].b);
+  const Vec3d middle = 0.5 * (tied.struts()[0].a + tied.struts()[0].b);
   EXPECT_LT(h.whole(middle), 0.7);
   const double strut_mm3 = 4.5 * 3.14159265 * (0.7 * 0.7 - 0.3 * 0.3);
   EXPECT_NEAR(tied.solid.volume_mm3() - raw.volume_mm3(), strut_mm3, 0.35 * strut_mm3);

@@ -20,7 +20,8 @@ struct Flips {
     std::array<std::uint64_t, 8> which{};  ///< Bit 8 y + z of word x: sample origin + (x, y, z).
     bool tile = false;                     ///< One value stands for all of them.
   };
-  std::vector<Block> blocks;  ///< Sorted by origin, x first; each once.
+  std::vector<Block> blocks;                     ///< Sorted by origin, x first; each once.
+  [[nodiscard]] bool holds(Vec3i sample) const;  ///< Cost: O(log blocks).
 };
 /// The solid with those of the samples that it holds turned over. Cost: a copy of the solid, if there is any flip in
 /// it and something else holds it too.

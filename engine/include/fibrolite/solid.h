@@ -33,6 +33,8 @@ class Solid {
   [[nodiscard]] std::int64_t active_voxels(const SampleRange& range) const;
   /// Trilinear distance at a world point, mm; +-(band) outside the band. Cost: O(1).
   [[nodiscard]] float distance(Vec3d p) const;
+  /// At sample (i, j, k), mm; +-(band) outside the band. Cost: O(1).
+  [[nodiscard]] float at(Vec3i sample) const;
 
   [[nodiscard]] const Impl& impl() const { return *impl_; }
   [[nodiscard]] std::shared_ptr<const Impl> share() const { return impl_; }

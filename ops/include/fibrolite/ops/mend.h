@@ -21,7 +21,7 @@ struct MendParams {
   TieParams tie{};      ///< Should mending leave loose pieces.
 };
 struct Mended {
-  Tied tied;                       ///< As before, with what was mended; `struts` of both.
+  Tied tied;                       ///< As before, with what was mended; changes of both.
   std::vector<Capsule> thickened;  ///< Balls in walls that were too thin and gaps that were too small.
   std::vector<Drain> drains;
   std::int64_t voids_filled = 0;  ///< Too small for a hole.

@@ -20,16 +20,22 @@ struct TieParams {
   Shape anchor = everything();
   Shape keep_out = nothing();  ///< Where no tie may lie: drain holes.
 };
+/// First something is taken off (trim.h), then struts are added.
+struct TieChange {
+  std::vector<Capsule> removed, struts;
+};
 struct Tied {
   Solid solid;
-  std::vector<Capsule> struts;
-  std::vector<Capsule> removed{};  ///< Taken off the whole before the struts were added (trim.h).
+  std::vector<TieChange> changes{};  ///< One after the other.
   std::int64_t dropped = 0, filled = 0;
   std::int64_t necks = 0;                        ///< Of the struts, those along necks that were too thin.
   std::int64_t tips_tied = 0, tips_removed = 0;  ///< Stick ends in the void (trim.h).
   std::int64_t dangling = 0;                     ///< Those that are left.
   Pieces left;  ///< left.material.size() == 1 unless the model itself has pieces farther apart than the reach.
   std::vector<Piece> unreached{};  ///< Still on too thin a neck: none, unless the model itself or keep_out forbids it.
+
+  [[nodiscard]] std::vector<Capsule> struts() const;   ///< Of all changes.
+  [[nodiscard]] std::vector<Capsule> removed() const;  ///< Of all changes.
 };
 /// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. Loose pieces
 /// first, then thin necks, a few rounds each. Cost: as pieces() and unreached(), and a realize per round that finds
@@ -39,6 +45,11 @@ struct Tied {
 /// What crosses a gap: grown into both its ends by half its diameter.
 [[nodiscard]] Capsule strut(const Gap& gap, double strut_mm);
 
+/// `whole` with these changes; struts only inside `body`, and not in `keep_out`.
+[[nodiscard]] Shape with_ties(const Shape& whole, const Shape& body, const std::vector<TieChange>& changes,
+                              const Shape& keep_out = nothing());
+/// What was done to `before`, and then to what came of it, added up.
+[[nodiscard]] Tied and_then(const Tied& before, Tied now);
 /// `before`, changed to `solid` and made one piece again; what was done adds up.
 [[nodiscard]] Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
                              const Context& context = {});
