@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "fibrolite/slice.h"
 
 namespace fibrolite {
+
+class KeptWork;  // kept_work.h
 
 enum class SliceFormat {
   PngZip,  ///< .zip: an 8-bit grey PNG per layer (row 0 on top: y points up), and manifest.json.
@@ -50,6 +53,9 @@ struct SliceJob {
   /// If given, what is cut instead of `shape`, for work that is never whole in memory: called for each plate with the
   /// first layer that is not yet written, in order.
   std::function<LayerRun(const SlicePlate& plate, int first)> run_from{};
+  /// If given, layers are kept there as they are finished, and those that it holds are not made again. Its work must
+  /// name all that a layer depends on: what is cut, plates, planes and screen.
+  std::shared_ptr<KeptWork> kept{};
 };
 struct SlicedPlate {
   std::vector<double> area_mm2;  ///< Per layer.
