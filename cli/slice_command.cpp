@@ -124,6 +124,8 @@ double bytes_a_cut(SliceFormat format) {
       return 17;
     case SliceFormat::Cli:
       return 15;
+    case SliceFormat::ThreeMf:
+      return 9;
   }
   return 0;
 }
@@ -308,7 +310,7 @@ void add_slice_command(CLI::App& program) {
   CLI::App& command =
       *program.add_subcommand("slice", "Layers for a printer, from a model or a solid (.vdb); no mesh is made");
   add_options(command, options->model);
-  add_options(command, options->output, {".zip", ".sl1", ".svg", ".cli"});
+  add_options(command, options->output, {".zip", ".sl1", ".svg", ".cli", ".3mf"});
   add_length(command, "--layer", options->layer_mm, "Height of a layer (default 0.05)");
   add_length(command, "--pixel", options->pixel_mm, "Edge of a pixel (default 0.05)");
   command

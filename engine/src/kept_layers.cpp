@@ -22,6 +22,8 @@ std::string word_of(SliceFormat format) {
       return "svg";
     case SliceFormat::Cli:
       return "cli";
+    case SliceFormat::ThreeMf:
+      return "3mf";
   }
   return "";
 }

@@ -20,14 +20,6 @@ std::string lower(std::string text) {
   return text;
 }
 
-std::string number(double value) {
-  std::array<char, 32> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-void append_integer(std::string& text, long long value) {
-  std::array<char, 24> digits;
-  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
-}
 std::string padded(int value, std::size_t digits) {
   std::string text = std::to_string(value);
   return std::string(digits - std::min(digits, text.size()), '0') + text;
@@ -42,6 +34,36 @@ std::string plain(const std::string& name) {
   }
   return text.empty() ? "part" : text;
 }
+
+}  // namespace
+
+std::string number(double value) {
+  std::array<char, 32> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+void append_integer(std::string& text, long long value) {
+  std::array<char, 24> digits;
+  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+}
+
+UnitPoint in_units(Vec2d mm) { return {std::llround(mm.x * 1e4), std::llround(mm.y * 1e4)}; }
+
+std::vector<UnitPoint> in_units(const Contour& outline) {
+  std::vector<UnitPoint> points;
+  for (const Vec2d p : outline.points)
+    if (const UnitPoint at = in_units(p); points.empty() || at != points.back()) points.push_back(at);
+  while (points.size() > 1 && points.back() == points.front()) points.pop_back();
+  if (points.size() < 3) points.clear();
+  return points;
+}
+
+void append_mm(std::string& text, long long units) {
+  append_integer(text, units / 10000);
+  const long long rest = units % 10000;
+  if (rest != 0) text.append(".").append(padded(static_cast<int>(rest), 4));
+}
+
+namespace {
 
 // ---- Archives
 
@@ -165,18 +187,15 @@ double total_area(const std::vector<Contour>& outlines) {
 std::string svg_path(const std::vector<Contour>& outlines, const SliceGrid& grid) {
   std::string text = "<path fill-rule=\"evenodd\" d=\"";
   const double top = grid.height * grid.pixel_mm.y;  // y points down in an SVG
-  const auto append = [&](double mm) {               // to 0.1 um; never negative, outlines end at the rim
-    append_integer(text, std::llround(mm * 1e4) / 10000);
-    const long long rest = std::llround(mm * 1e4) % 10000;
-    if (rest != 0) text.append(".").append(padded(static_cast<int>(rest), 4));
-  };
+  // Never negative: outlines end at the rim.
   for (const Contour& outline : outlines) {
     char command = 'M';
     for (const Vec2d p : outline.points) {
+      const UnitPoint at = in_units(Vec2d{p.x, top - p.y});
       text.push_back(command);
-      append(p.x);
+      append_mm(text, at.x);
       text.push_back(' ');
-      append(top - p.y);
+      append_mm(text, at.y);
       command = 'L';
     }
     text.push_back('Z');
@@ -238,28 +257,21 @@ class CliFile final : public LayerFormat {
   [[nodiscard]] EncodedLayer encode(const Shape& shape, const SlicePlate& plate, int layer) const override {
     const std::vector<Contour> outlines = contours(shape, plate.grid, layer);
     std::string text = "$$LAYER/";
-    append_integer(text, units((layer + 1) * plate.grid.layer_mm));
+    append_integer(text, std::llround((layer + 1) * plate.grid.layer_mm * 1e4));
     text += "\n";
     for (const Contour& outline : outlines) {
-      std::string points;
-      int count = 0;
-      std::pair<long long, long long> last{-1, -1};
-      const auto append = [&](Vec2d p) {
-        const std::pair<long long, long long> at{units(p.x), units(p.y)};
-        if (at == last) return;  // closer than a unit
-        last = at;
-        points += ",";
-        append_integer(points, at.first);
-        points += ",";
-        append_integer(points, at.second);
-        ++count;
-      };
-      for (const Vec2d p : outline.points) append(p);
-      append(outline.points.front());
-      if (count < 4) continue;  // nothing is left of it
+      std::vector<UnitPoint> points = in_units(outline);
+      if (points.empty()) continue;
+      points.push_back(points.front());
       text += outline.area_mm2 > 0 ? "$$POLYLINE/1,1," : "$$POLYLINE/1,0,";
-      append_integer(text, count);
-      text += points + "\n";
+      append_integer(text, static_cast<long long>(points.size()));
+      for (const UnitPoint& p : points) {
+        text += ",";
+        append_integer(text, p.x);
+        text += ",";
+        append_integer(text, p.y);
+      }
+      text += "\n";
     }
     return {layer, std::move(text), {}, total_area(outlines)};
   }
@@ -272,7 +284,6 @@ class CliFile final : public LayerFormat {
   void finish(const std::vector<SlicedPlate>&) override { file_->write("$$GEOMETRYEND\n"); }
 
  private:
-  static long long units(double mm) { return std::llround(mm * 1e4); }
   OutputFile* file_;
 };
 
@@ -285,13 +296,14 @@ SliceFormat slice_format(const std::filesystem::path& path) {
   if (name.ends_with(".sl1")) return SliceFormat::Sl1;
   if (name.ends_with(".svg")) return SliceFormat::Svg;
   if (name.ends_with(".cli")) return SliceFormat::Cli;
-  throw Error(Code::Unsupported, "not a format of layers", path.string(), "use .zip .sl1 .svg.zip .svg .cli");
+  if (name.ends_with(".3mf")) return SliceFormat::ThreeMf;
+  throw Error(Code::Unsupported, "not a format of layers", path.string(), "use .zip .sl1 .svg.zip .svg .cli .3mf");
 }
 
 int most_layers(SliceFormat format) {
   // A zip without extensions numbers its entries with 16 bits; two are for what is said about the layers.
-  const bool archive = format != SliceFormat::Svg && format != SliceFormat::Cli;
-  return archive ? 65535 - 2 : 1 << 24;
+  const bool entries = format == SliceFormat::PngZip || format == SliceFormat::Sl1 || format == SliceFormat::SvgZip;
+  return entries ? 65535 - 2 : 1 << 24;
 }
 
 std::unique_ptr<LayerFormat> make_format(SliceFormat format, const SliceJob& job, OutputFile& file) {
@@ -306,6 +318,8 @@ std::unique_ptr<LayerFormat> make_format(SliceFormat format, const SliceJob& job
       return std::make_unique<SvgFile>(job, file);
     case SliceFormat::Cli:
       return std::make_unique<CliFile>(job, file);
+    case SliceFormat::ThreeMf:
+      return make_slice_stack(job, file);
   }
   throw Error(Code::Internal, "no such format of layers");
 }

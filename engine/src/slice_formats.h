@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "fibrolite/contours.h"
 #include "fibrolite/file.h"
 #include "fibrolite/slice_io.h"
 #include "zip_writer.h"
@@ -39,6 +40,23 @@ class LayerFormat {
   const SliceJob& job_;
 };
 
+// What formats share.
+
+/// The shortest text that reads back to the same value.
+[[nodiscard]] std::string number(double value);
+void append_integer(std::string& text, long long value);
+/// A tenth of a micrometre: finer than any printer.
+struct UnitPoint {
+  long long x = 0, y = 0;
+  friend bool operator==(const UnitPoint&, const UnitPoint&) = default;
+};
+[[nodiscard]] UnitPoint in_units(Vec2d mm);
+/// Of an outline, the first point not repeated, none twice in a row; empty if less than a triangle is left of it.
+[[nodiscard]] std::vector<UnitPoint> in_units(const Contour& outline);
+/// In mm, without needless zeros; units must not be negative.
+void append_mm(std::string& text, long long units);
+
+[[nodiscard]] std::unique_ptr<LayerFormat> make_slice_stack(const SliceJob& job, OutputFile& file);  // slice_3mf.cpp
 [[nodiscard]] std::unique_ptr<LayerFormat> make_format(SliceFormat format, const SliceJob& job, OutputFile& file);
 
 }  // namespace fibrolite

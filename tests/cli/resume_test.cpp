@@ -113,14 +113,15 @@ TEST(Resume, KilledInTheMiddleOfAWholeItEndsWithTheSameBytes) {
   // The first output decides where it is kept; the others are sliced after it.
   const auto with_outlines = [](const TempDir& at) {
     Command run = whole(at, "y.sl1");
-    run.arguments = run.arguments + Arguments{"-o", at / "y.svg", "-o", at / "y.cli", "-o", at / "y.svg.zip"};
+    run.arguments =
+        run.arguments + Arguments{"-o", at / "y.svg", "-o", at / "y.cli", "-o", at / "y.svg.zip", "-o", at / "y.3mf"};
     return run;
   };
   const Command once = with_outlines(undisturbed), again = with_outlines(folder);
   run(once.arguments);
   std::size_t batches = 0;
   // In each of the files.
-  for (const char* format : {"sl1", "svg", "cli", "svgzip"}) {
+  for (const char* format : {"sl1", "svg", "cli", "svgzip", "3mf"}) {
     Process process(FIBROLITE_PROGRAM, again.arguments + Arguments{"--resume"});
     while (kept(folder, again, std::string("layers-").append(format).append("-0-16")).empty() && !process.ended())
       std::this_thread::yield();
@@ -131,8 +132,8 @@ TEST(Resume, KilledInTheMiddleOfAWholeItEndsWithTheSameBytes) {
   }
   const Finished last = run(again.arguments + Arguments{"--resume"});
   EXPECT_THAT(last.err, HasSubstr("resumed layers"));
-  expect_same_outcome(folder, undisturbed, {"y.sl1", "y.svg", "y.cli", "y.svg.zip"});
-  EXPECT_THAT(names_in(folder.path()), ElementsAre("y.cli", "y.report.json", "y.sl1", "y.svg", "y.svg.zip"));
+  expect_same_outcome(folder, undisturbed, {"y.sl1", "y.svg", "y.cli", "y.svg.zip", "y.3mf"});
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("y.3mf", "y.cli", "y.report.json", "y.sl1", "y.svg", "y.svg.zip"));
 }
 
 TEST(Resume, InterruptedItSaysHowToGoOn) {

@@ -118,7 +118,7 @@ TEST(SliceIo, ARunThatWasCutShortGoesOnToTheSameBytes) {
   two.plates = {{"left", grid(-6, 0)}, {"right", grid(0, 9)}};
   for (const auto& [name, work, layers] :
        {std::tuple("a.sl1", tall, 80), std::tuple("a.svg", tall, 80), std::tuple("a.cli", tall, 80),
-        std::tuple("a.svg.zip", tall, 80), std::tuple("a.zip", two, 160)}) {
+        std::tuple("a.svg.zip", tall, 80), std::tuple("a.3mf", tall, 80), std::tuple("a.zip", two, 160)}) {
     const auto wanted = write(folder / name, work);
     const std::string bytes = content(folder / name);
     fs::remove(folder / name);
@@ -255,7 +255,7 @@ TEST(SliceIo, AnSvgsOutlinesEndAtTheRimOfItsPicture) {
 
 TEST(SliceIo, SameBytesOnOneAndTwoThreads) {
   const TempDir folder;
-  for (const std::string ending : {".zip", ".sl1", ".svg", ".svg.zip", ".cli"}) {
+  for (const std::string ending : {".zip", ".sl1", ".svg", ".svg.zip", ".cli", ".3mf"}) {
     for (int threads = 1; threads <= 2; ++threads) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
       write(folder / (std::to_string(threads) + ending), job());

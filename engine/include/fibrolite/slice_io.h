@@ -21,7 +21,8 @@ enum class SliceFormat {
   Sl1,     ///< .sl1: PNGs with config.ini and prusaslicer.ini, as PrusaSlicer and Prusa's resin printers read them.
   SvgZip,  ///< .svg.zip: an .svg per layer, in mm, and manifest.json.
   Svg,     ///< .svg: one file, a group per layer.
-  Cli      ///< .cli: Common Layer Interface 2.0, ASCII, units of 0.0001 mm; material to the left of its polylines.
+  Cli,     ///< .cli: Common Layer Interface 2.0, ASCII, units of 0.0001 mm; material to the left of its polylines.
+  ThreeMf  ///< .3mf: a slice stack (3MF Slice Extension 1.0), with a box for a mesh; mm, four decimals.
 };
 /// By the ending, without case. @throws Error Unsupported: none of the above.
 [[nodiscard]] SliceFormat slice_format(const std::filesystem::path& path);
