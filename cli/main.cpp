@@ -82,8 +82,12 @@ int run_and_report(int argc, char** argv) {
     return run(argc, argv);
   } catch (const std::exception& problem) {
     // What a cancelled stage or a child process complains about then is only an echo.
-    if (interrupted()) return fail("cancelled (by a signal); nothing was written", Interrupted);
-    if (const auto* error = dynamic_cast<const Error*>(&problem)) return fail(error->what(), exit_code(error->code()));
+    if (interrupted()) return fail(std::string(cancelled_line()), Interrupted);
+    if (const auto* error = dynamic_cast<const Error*>(&problem)) {
+      const bool later = error->code() == Code::Io && resumable();
+      return fail(std::string(error->what()).append(later ? "; then run again with --resume to go on" : ""),
+                  exit_code(error->code()));
+    }
     if (dynamic_cast<const UsageError*>(&problem) != nullptr) return fail(problem.what(), Usage);
     if (dynamic_cast<const std::bad_alloc*>(&problem) != nullptr)
       return fail("out of memory (allocation failed); use a larger --voxel", OutOfMemory);

@@ -68,6 +68,12 @@ const fs::path& Outputs::place(const fs::path& target) const {
   throw Error(Code::Internal, "an output that was not planned", target.string());
 }
 
+std::vector<fs::path> Outputs::hidden() const {
+  std::vector<fs::path> all;
+  for (const Item& item : items_) all.push_back(item.hidden);
+  return all;
+}
+
 void Outputs::commit() {
   in_commit = true;
   std::error_code error;

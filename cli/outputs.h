@@ -20,6 +20,8 @@ class Outputs {
 
   /// Where to write what shall become `target`, which must be one of the constructor's.
   [[nodiscard]] const std::filesystem::path& place(const std::filesystem::path& target) const;
+  /// All such places.
+  [[nodiscard]] std::vector<std::filesystem::path> hidden() const;
   /// @throws Error Io; then none of the outputs is there.
   void commit();
 

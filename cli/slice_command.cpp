@@ -14,6 +14,7 @@
 #include "fibrolite/solid_io.h"
 #include "job.h"
 #include "options.h"
+#include "resume.h"
 #include "slice_plates.h"
 #include "summary.h"
 
@@ -30,7 +31,7 @@ struct SliceOptions {
   std::optional<double> voxel_mm, layer_mm, pixel_mm;
   std::optional<Printer> printer;
   InfillKind infill = InfillKind::Hybrid;
-  bool tile = false;
+  bool tile = false, resume = false;
   int planes = 1;
 
   [[nodiscard]] std::vector<fs::path> targets() const {
@@ -123,6 +124,8 @@ double bytes_a_cut(SliceFormat format) {
       return 17;
     case SliceFormat::Cli:
       return 15;
+    case SliceFormat::ThreeMf:
+      return 9;
   }
   return 0;
 }
@@ -159,6 +162,40 @@ std::string plan(const SliceOptions& options, const Source& source, const std::v
     text +=
         "output    " + file.string() + ", about " + memory_text(expected_bytes(file, plates, source.area_mm2)) + "\n";
   return text + "dry run: nothing was written\n";
+}
+
+/// What the layers are made of and how; threads and memory do not matter, but for what needs the whole solid.
+WorkText work_of(const SliceOptions& options, const HybridizeParams& params, const std::vector<SlicePlate>& plates,
+                 const Context& context) {
+  WorkText work(context);
+  work.add_file("the_model's_content", options.model.path);
+  work.add("--unit", options.model.prepare.unit_mm.value_or(0));
+  work.add("--size", options.model.prepare.size_mm.value_or(0));
+  const Vec3d up = direction(options.model.up);
+  work.add("--up", number_text(up.x) + " " + number_text(up.y) + " " + number_text(up.z));
+  work.add("--infill", std::string(name_of(options.infill)));
+  work.add("--voxel", params.voxel_mm.value_or(0));
+  work.add("--planes", std::to_string(options.planes));
+  const Screen screen = options.printer ? options.printer->screen : Screen{};
+  work.add("screen", std::string(screen.portrait ? "portrait" : "landscape") + (screen.mirrored ? ", mirrored" : ""));
+  for (const SlicePlate& plate : plates) {
+    const SliceGrid& grid = plate.grid;
+    const std::string of = plate.name.empty() ? "" : "_of_" + plate.name;
+    work.add("--layer" + of, grid.layer_mm);
+    work.add("layers" + of, std::to_string(grid.layers));
+    work.add("--pixel.x" + of, grid.pixel_mm.x);
+    work.add("--pixel.y" + of, grid.pixel_mm.y);
+    work.add("width" + of, std::to_string(grid.width));
+    work.add("height" + of, std::to_string(grid.height));
+    const Frame& frame = grid.frame;
+    int number = 0;
+    for (const Vec3d at : {frame.origin, frame.x, frame.y, frame.z})
+      for (int axis = 0; axis < 3; ++axis) work.add("place" + of + "." + std::to_string(number++), at[axis]);
+  }
+  work.add(params.recipe);
+  // Stick ends are only mended of a whole solid.
+  work.add("the_solid", params.slabs ? "in slabs (see --max-memory)" : "whole (see --max-memory)");
+  return work;
 }
 
 void slice_to_files(const SliceOptions& options) {
@@ -217,6 +254,11 @@ void slice_to_files(const SliceOptions& options) {
   }
   if (options.run.dry_run) return print(plan(options, source, plates));
 
+  std::optional<Resume> resume;
+  if (options.resume) {
+    resume.emplace(options.output.files.front(), work_of(options, params, plates, context), job.outputs, context);
+    params.kept = resume->kept();
+  }
   std::optional<SolidStream> stream;
   if (!options.from_solid()) {
     report.infill = name_of(options.infill);
@@ -233,6 +275,7 @@ void slice_to_files(const SliceOptions& options) {
   SliceJob work{source.shape, plates, options.planes, options.output.files.front().stem().string(),
                 options.printer ? options.printer->screen : Screen{}};
   if (stream) work.run_from = from_slabs(*stream, context);
+  work.kept = params.kept;
   std::vector<SlicedPlate> done;
   stage("layers", [&] {
     const auto files = static_cast<double>(options.output.files.size());
@@ -243,7 +286,7 @@ void slice_to_files(const SliceOptions& options) {
                           context.part(0.4 + 0.6 * n / files, 0.4 + 0.6 * (n + 1) / files, "layers"));
     }
   });
-  if (stream) stream->finish(report);
+  if (stream) stream->finish(report, context);
   report.slices = described(plates);
   for (std::size_t p = 0; p < plates.size(); ++p) {
     report.slices[p].volume_mm3 = done[p].volume_mm3;
@@ -256,6 +299,7 @@ void slice_to_files(const SliceOptions& options) {
                               number_text(solid_mm3) + " mm3: use thinner layers or smaller pixels or voxels");
   }
   job.finish(options.output.report_path());
+  if (resume) resume->done();
   if (!options.run.quiet) print_layers(report, options.targets());
 }
 
@@ -266,7 +310,7 @@ void add_slice_command(CLI::App& program) {
   CLI::App& command =
       *program.add_subcommand("slice", "Layers for a printer, from a model or a solid (.vdb); no mesh is made");
   add_options(command, options->model);
-  add_options(command, options->output, {".zip", ".sl1", ".svg", ".cli"});
+  add_options(command, options->output, {".zip", ".sl1", ".svg", ".cli", ".3mf"});
   add_length(command, "--layer", options->layer_mm, "Height of a layer (default 0.05)");
   add_length(command, "--pixel", options->pixel_mm, "Edge of a pixel (default 0.05)");
   command
@@ -283,6 +327,10 @@ void add_slice_command(CLI::App& program) {
   add_voxel(command, options->voxel_mm,
             "Voxel edge of the body, and of the check that all is one piece (default: as for generate)");
   add_options(command, options->recipe);
+  command.add_flag(
+      "--resume", options->resume,
+      "Keep what is finished (in .OUT.resume beside the first OUT) until all is; go on from there if a run "
+      "with --resume was interrupted");
   command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");
   add_options(command, options->run);
   command.callback([options, &command] {

@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 std::atomic<const Context*> running{nullptr};
-std::atomic<bool> asked_to_stop{false};
+std::atomic<bool> asked_to_stop{false}, can_go_on{false};
 
 /// Only lock-free atomics and system calls in here.
 extern "C" void on_signal(int) {
@@ -32,8 +32,8 @@ extern "C" void on_signal(int) {
   if (Outputs::committing()) return;  // all outputs are in place in a moment
   discard_uncommitted_files();
   Outputs::discard();
-  constexpr std::string_view line = "fibrolite: error: cancelled (by a signal); nothing was written\n";
-  static_cast<void>(!::write(STDERR_FILENO, line.data(), line.size()));
+  for (const std::string_view text : {std::string_view("fibrolite: error: "), cancelled_line(), std::string_view("\n")})
+    static_cast<void>(!::write(STDERR_FILENO, text.data(), text.size()));
   _exit(Interrupted);
 }
 
@@ -140,6 +140,14 @@ void handle_signals() {
 }
 
 bool interrupted() { return asked_to_stop; }
+
+void set_resumable(bool resumable) { can_go_on = resumable; }
+bool resumable() { return can_go_on; }
+
+std::string_view cancelled_line() {
+  return can_go_on ? "cancelled (by a signal); run again with --resume to go on"
+                   : "cancelled (by a signal); nothing was written";
+}
 
 void print(const std::string& text) {
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "fibrolite/context.h"
 #include "options.h"
@@ -30,6 +31,11 @@ class Terminal {
 void handle_signals();
 /// Whether a signal asked to stop.
 [[nodiscard]] bool interrupted();
+/// Whether a run that ends early can be gone on with (resume.h), and what is then said; else, of a cancelled one, that
+/// nothing was written.
+void set_resumable(bool resumable);
+[[nodiscard]] bool resumable();
+[[nodiscard]] std::string_view cancelled_line();
 /// Results: to standard output. @throws Error Io if it cannot be written.
 void print(const std::string& text);
 /// "fibrolite: error: MESSAGE" as one line on stderr.

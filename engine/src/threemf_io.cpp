@@ -7,6 +7,7 @@
 
 #include "fibrolite/error.h"
 #include "mesh_formats.h"
+#include "threemf_package.h"
 #include "zip_writer.h"
 
 namespace fibrolite {
@@ -241,12 +242,7 @@ class Palette {
 
 MeshFile read_3mf(const Source& source, const Context& context) { return ThreeMfReader(source, context).read(); }
 
-// Why not lib3mf's writer: it prints six digits behind the point, whatever the size of the number (1e-7 becomes 0),
-// puts random UUIDs into the file, and holds a second copy of the mesh.
-void write_3mf(OutputFile& file, const MeshLayers& mesh, const Context& context) {
-  if (mesh.vertices() > 0x7fffffffu)
-    throw Error(Code::TooLarge, "a 3MF mesh has at most 2,147,483,647 vertices", "", "write .stl or .ply");
-  ZipWriter zip(file);
+void begin_3mf(ZipWriter& zip) {
   zip.add("[Content_Types].xml",
           R"(<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -260,7 +256,15 @@ void write_3mf(OutputFile& file, const MeshLayers& mesh, const Context& context)
 <Relationship Target="/3D/3dmodel.model" Id="rel0" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
 </Relationships>
 )");
+}
 
+// Why not lib3mf's writer: it prints six digits behind the point, whatever the size of the number (1e-7 becomes 0),
+// puts random UUIDs into the file, and holds a second copy of the mesh.
+void write_3mf(OutputFile& file, const MeshLayers& mesh, const Context& context) {
+  if (mesh.vertices() > 0x7fffffffu)
+    throw Error(Code::TooLarge, "a 3MF mesh has at most 2,147,483,647 vertices", "", "write .stl or .ply");
+  ZipWriter zip(file);
+  begin_3mf(zip);
   std::string begin = R"(<?xml version="1.0" encoding="UTF-8"?>
 <model unit="millimeter" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 <metadata name="Application">Fibrolite</metadata>
@@ -275,7 +279,7 @@ void write_3mf(OutputFile& file, const MeshLayers& mesh, const Context& context)
   } else {
     begin += "<object id=\"1\" type=\"model\">\n";
   }
-  zip.open("3D/3dmodel.model");
+  zip.open(model_part_3mf);
   zip.append(deflate_piece(begin + "<mesh>\n<vertices>\n"));
   const auto vertex = [](std::string& text, Vec3f p) {
     text += "<vertex x=\"";

@@ -63,6 +63,9 @@ void ZipWriter::Entry::count(const DeflatedPiece& piece) {
   crc = static_cast<std::uint32_t>(crc32_combine(crc, piece.crc, static_cast<z_off_t>(piece.raw_size)));
   size += piece.bytes.size();
   raw_size += piece.raw_size;
+  // What grew too large is refused now, and not when it is done.
+  static_cast<void>(narrow(size));
+  static_cast<void>(narrow(raw_size));
 }
 
 std::string ZipWriter::Entry::fields() const {

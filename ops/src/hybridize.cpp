@@ -82,7 +82,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   if (params.slabs) {
     out.stream = run("pieces", 1.0, [&](const Context& c) {
       Design design{params.infill, recipe, assembly, out.parts, std::move(fills), out.interfaces, out.joints, demand_n};
-      return stream(model.mesh, std::move(design), *params.slabs, grid, report, c);
+      return stream(model.mesh, std::move(design), *params.slabs, grid, params.kept, report, c);
     });
     return out;
   }

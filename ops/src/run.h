@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -76,9 +77,9 @@ struct Design {
   std::vector<Joint> joints;
   std::vector<double> demand_n;  ///< Of each interface.
 };
-/// The first pass over a solid that is never whole (solid_stream.h).
-[[nodiscard]] SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid grid, Report& report,
-                                 const Context& context);
+/// The first pass over a solid that is never whole (solid_stream.h). `kept`: may be none.
+[[nodiscard]] SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid grid,
+                                 std::shared_ptr<KeptWork> kept, Report& report, const Context& context);
 
 [[nodiscard]] Shape compose(const Shape& body, const Parts& parts, const std::vector<Fill>& fills,
                             const std::vector<Joint>& joints, InfillKind infill, const Recipe& recipe,

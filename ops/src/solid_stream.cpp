@@ -14,6 +14,7 @@
 #include "fibrolite/realize.h"
 #include "fibrolite/slice.h"
 #include "fibrolite/to_solid.h"
+#include "kept_stream.h"
 #include "print_limits.h"
 #include "run.h"
 
@@ -28,14 +29,15 @@ int& along(Vec3i& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
 }  // namespace
 
 struct SolidStream::Impl {
-  Impl(const Mesh& model, Design d, SlabPlan p, Grid g, const Context& context)
+  Impl(const Mesh& model, Design d, SlabPlan p, Grid g, std::shared_ptr<KeptWork> k, const Context& context)
       : design(std::move(d)),
         plan(std::move(p)),
         grid(g),
+        kept(std::move(k)),
         voxels(model, {.grid = grid, .inside_band_mm = design.assembly.shell_mm}, context) {
     for (const Part& part : design.parts.parts) regions.push_back(part.region());
     sticks = sticks_of(design.parts, design.fills);
-    sums.resize(regions.size());
+    sums.parts.resize(regions.size());
     measured.resize(plan.borders.size() - 1, false);
   }
 
@@ -241,34 +243,55 @@ struct SolidStream::Impl {
     return as_function(over(smooth_distance_to(slab.body)), slab.body, mended, changed, context);
   }
 
-  void measure(std::size_t number, const Slab& slab, const Context& context) {
-    measured[number] = true;
-    const double shell_mm = design.assembly.shell_mm;
-    const auto part = fibrolite::measure(slab.body, slab.solid, regions, shell_mm, slab.range, quiet(context));
-    for (std::size_t i = 0; i < part.size(); ++i) sums[i] += part[i];
-    body_vox += slab.body.volume_vox(slab.range);
-    solid_vox += slab.solid.volume_vox(slab.range);
-    active_voxels += slab.solid.active_voxels(slab.range);
-    if (design.recipe.print.check) {
-      const Shape lumen = printed_lumen(distance_to(slab.body), shell_mm);
-      add(faults,
-          print_scan(slab.solid, lumen, design.recipe.print, design.recipe.verify.up, slab.range, quiet(context)));
+  /// The first pass, unless it was kept.
+  void prepare(const Context& context) {
+    if (kept && recall(*kept, made.tied, found.flips)) {
+      for (std::size_t i = 0; i < measured.size(); ++i) {
+        SlabSums slab;
+        if (!recall(*kept, range(i), slab)) continue;
+        sums += slab;
+        measured[i] = true;
+      }
+      context.log("resumed the first pass and what was measured of " +
+                  std::to_string(std::count(measured.begin(), measured.end(), true)) + " of " +
+                  std::to_string(measured.size()) + " slabs");
+      return;
     }
+    make(context);
+    if (kept) fibrolite::keep(*kept, made.tied, found.flips);
   }
 
-  void finish(Report& report) const {
-    if (std::find(measured.begin(), measured.end(), false) != measured.end())
-      throw Error(Code::Internal, "a slab was not asked for");
+  void measure(std::size_t number, const Slab& slab, const Context& context) {
+    const double shell_mm = design.assembly.shell_mm;
+    SlabSums here;
+    here.parts = fibrolite::measure(slab.body, slab.solid, regions, shell_mm, slab.range, quiet(context));
+    here.body_vox = slab.body.volume_vox(slab.range);
+    here.solid_vox = slab.solid.volume_vox(slab.range);
+    here.active_voxels = slab.solid.active_voxels(slab.range);
+    if (design.recipe.print.check) {
+      const Shape lumen = printed_lumen(distance_to(slab.body), shell_mm);
+      here.faults =
+          print_scan(slab.solid, lumen, design.recipe.print, design.recipe.verify.up, slab.range, quiet(context));
+    }
+    if (kept) fibrolite::keep(*kept, slab.range, here);
+    sums += here;
+    measured[number] = true;
+  }
+
+  void finish(Report& report, const Context& context) {
+    for (std::size_t i = 0; i < measured.size(); ++i)
+      if (!measured[i]) static_cast<void>(slab(i, context));
     std::vector<PartVolumes> volumes;
-    for (const PartSums& part : sums) volumes.push_back(part.volumes(grid.voxel_mm));
+    for (const PartSums& part : sums.parts) volumes.push_back(part.volumes(grid.voxel_mm));
     report_parts(design.parts, design.fills, volumes, design.infill, report);
     report_joints(design.interfaces, design.joints, design.demand_n, design.recipe, report);
     const double h = grid.voxel_mm;
-    report.solid.active_voxels = active_voxels;
+    report.solid.active_voxels = sums.active_voxels;
     report.solid.voxel_mm = h;
-    report_solid(made.tied, design.fills, body_vox * h * h * h, solid_vox * h * h * h, design.recipe.material, report);
+    report_solid(made.tied, design.fills, sums.body_vox * h * h * h, sums.solid_vox * h * h * h, design.recipe.material,
+                 report);
     if (const PrintParams& limits = design.recipe.print; limits.check) {
-      Scan all = faults;
+      Scan all = sums.faults;
       drop_noise(all, limits, h);
       report.print.found = summed(all, design.recipe.verify.up, node_mm(design.fills, limits));
       report.print.checked = true;
@@ -278,6 +301,7 @@ struct SolidStream::Impl {
   const Design design;
   const SlabPlan plan;
   const Grid grid;
+  const std::shared_ptr<KeptWork> kept;
   const MeshVoxels voxels;
   std::vector<Shape> regions;
   std::vector<Sticks> sticks;
@@ -285,10 +309,7 @@ struct SolidStream::Impl {
   PieceSweep::Result found, hanging;     ///< Pieces; and what a skin of half a neck cuts off.
   std::vector<StickSweep> along_sticks;  ///< One for each of sticks.
   std::vector<bool> measured;
-  std::vector<PartSums> sums;
-  double body_vox = 0, solid_vox = 0;
-  std::int64_t active_voxels = 0;
-  Scan faults;
+  SlabSums sums;  ///< Of those.
 };
 
 const SlabPlan& SolidStream::plan() const { return impl_->plan; }
@@ -300,14 +321,15 @@ std::size_t SolidStream::slab_at(double mm) const {
 }
 SolidStream::Slab SolidStream::slab(std::size_t number, const Context& context) { return impl_->slab(number, context); }
 Shape SolidStream::printed(const Slab& slab, const Context& context) const { return impl_->printed(slab, context); }
-void SolidStream::finish(Report& report) const { impl_->finish(report); }
+void SolidStream::finish(Report& report, const Context& context) { impl_->finish(report, context); }
 
-SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid grid, Report& report,
-                   const Context& context) {
-  auto impl = std::make_shared<SolidStream::Impl>(model, std::move(design), plan, grid, context.part(0, 0.3, "body"));
+SolidStream stream(const Mesh& model, Design design, const SlabPlan& plan, Grid grid, std::shared_ptr<KeptWork> kept,
+                   Report& report, const Context& context) {
+  auto impl = std::make_shared<SolidStream::Impl>(model, std::move(design), plan, grid, std::move(kept),
+                                                  context.part(0, 0.3, "body"));
   const std::vector<std::string>& repairs = impl->voxels.repairs();
   report.model.repairs.insert(report.model.repairs.end(), repairs.begin(), repairs.end());
-  impl->make(context.part(0.3, 0.95, "one piece"));
+  impl->prepare(context.part(0.3, 0.95, "one piece"));
   return SolidStream(std::move(impl));
 }
 

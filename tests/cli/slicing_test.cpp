@@ -201,7 +201,7 @@ TEST_F(SlicingRefused, FilesAndModels) {
 }
 TEST_F(SlicingRefused, AFullDiskMidRun) {
   // No file may grow beyond 64 KiB: the archive is refused half-way, as on a full disk.
-  for (const std::string name : {"out.zip", "out.cli", "out.svg"}) {
+  for (const std::string name : {"out.zip", "out.cli", "out.svg", "out.3mf"}) {
     const std::string command = "trap '' XFSZ; ulimit -f 64; exec '" + std::string(FIBROLITE_PROGRAM) + "' slice '" +
                                 good_model().string() + "' -o '" + (outputs / name).string() +
                                 "' --infill solid --voxel 0.5 --layer 0.02 --pixel 0.05";

@@ -17,6 +17,7 @@
 
 #include "archive.h"
 #include "fibrolite/error.h"
+#include "fibrolite/kept_work.h"
 #include "models.h"
 
 namespace fibrolite {
@@ -104,6 +105,54 @@ TEST(SliceIo, AnSl1IsWhatThePrinterReads) {
   const GrayImage png = grey_png(entries.at("tube___pin00003.png"));
   EXPECT_EQ(png.width, 120);
   EXPECT_EQ(png.height, 150);
+}
+
+TEST(SliceIo, ARunThatWasCutShortGoesOnToTheSameBytes) {
+  const TempDir folder;
+  SliceJob tall = job();
+  const auto grid = [](double from, double to) {
+    return slice_grid({}, {{from, -6, 0}, {to, 6, 4}}, {0.1, 0.1}, 0.05);
+  };
+  tall.plates = {{"", grid(-6, 9)}};
+  SliceJob two = tall;
+  two.plates = {{"left", grid(-6, 0)}, {"right", grid(0, 9)}};
+  for (const auto& [name, work, layers] :
+       {std::tuple("a.sl1", tall, 80), std::tuple("a.svg", tall, 80), std::tuple("a.cli", tall, 80),
+        std::tuple("a.svg.zip", tall, 80), std::tuple("a.3mf", tall, 80), std::tuple("a.zip", two, 160)}) {
+    const auto wanted = write(folder / name, work);
+    const std::string bytes = content(folder / name);
+    fs::remove(folder / name);
+    // Cut short by its caller, again and again; stretches of 21 layers end anywhere in what is kept together.
+    int made = 0, runs = 0;
+    for (bool ended = false; !ended; ++runs) {
+      ASSERT_LT(runs, 20) << name;
+      SliceJob part = work;
+      part.kept = std::make_shared<KeptWork>(folder / "kept", "this very job\n");
+      const std::size_t before = part.kept->parts().size();
+      part.run_from = [&, ready = 0](const SlicePlate& plate, int first) mutable {
+        if (ready >= 42) throw Error(Code::Cancelled, "enough for now");
+        const int last = std::min(first + 21, plate.grid.layers);
+        made += last - first;
+        ready += last - first;
+        return LayerRun{last, work.shape};
+      };
+      try {
+        const auto done = write(folder / name, part);
+        ended = true;
+        ASSERT_EQ(done.size(), wanted.size());
+        for (std::size_t p = 0; p < done.size(); ++p) EXPECT_EQ(done[p].area_mm2, wanted[p].area_mm2);
+        part.kept->discard();
+      } catch (const Error& error) {
+        ASSERT_EQ(error.code(), Code::Cancelled);
+        EXPECT_FALSE(fs::exists(folder / name));
+        EXPECT_GE(part.kept->parts().size(), before + 2) << name;  // of 42 layers at least 32 stay
+      }
+    }
+    EXPECT_GE(runs, 2);
+    EXPECT_LE(made, layers + 15 * runs) << name;
+    EXPECT_TRUE(content(folder / name) == bytes) << name;
+    EXPECT_FALSE(fs::exists(folder / "kept"));
+  }
 }
 
 /// Signed areas and closedness of the polylines of an ASCII .cli, layer by layer.
@@ -206,7 +255,7 @@ TEST(SliceIo, AnSvgsOutlinesEndAtTheRimOfItsPicture) {
 
 TEST(SliceIo, SameBytesOnOneAndTwoThreads) {
   const TempDir folder;
-  for (const std::string ending : {".zip", ".sl1", ".svg", ".svg.zip", ".cli"}) {
+  for (const std::string ending : {".zip", ".sl1", ".svg", ".svg.zip", ".cli", ".3mf"}) {
     for (int threads = 1; threads <= 2; ++threads) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
       write(folder / (std::to_string(threads) + ending), job());

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "fibrolite/blocks.h"
+#include "fibrolite/kept_work.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/random.h"
 #include "hybrid_runs.h"
@@ -170,6 +171,52 @@ TEST(SolidStream, ties_and_removes_what_hangs_free_as_the_whole_does) {
   EXPECT_EQ(whole.report.solid.pieces, 1);
   expect_same_in_slabs(whole, mesh, params, 2, 16, false);  // a border through the ends, others through their sticks
   expect_same_in_slabs(whole, mesh, params, 0, 40, true);
+}
+
+TEST(SolidStream, goes_on_with_what_a_run_before_has_found) {
+  const testing::TempDir folder;
+  const Mesh mesh = testing::cube(40);
+  HybridizeParams params = params_of(InfillKind::Shell, 0.5);
+  params.recipe.partition.overrides.solid = {Box3d{{6, 10, 10}, {16, 30, 30}}, Box3d{{19, 10, 10}, {26, 18, 18}}};
+  const Outcome whole = hybridized(mesh, params);
+  std::string said;
+  const auto go_on = [&](int thickness) {
+    HybridizeParams cut = params;
+    cut.slabs = slabs_of(mesh, *params.voxel_mm, 0, thickness);
+    cut.kept = std::make_shared<KeptWork>(folder / "kept", "this very cube\n");
+    said.clear();
+    Report report;
+    const Context context({}, [&](std::string_view line) { said.append(line).append("\n"); });
+    Hybrid hybrid = hybridize(prepare({mesh, 1.0, {}}, {}), cut, report, context);
+    return Outcome{std::move(hybrid), std::move(report)};
+  };
+  {
+    Outcome first = go_on(16);
+    EXPECT_EQ(said, "");
+    for (const std::size_t slab : {0, 1, 3}) (void)first.hybrid.stream->slab(slab);
+  }
+  {
+    Outcome second = go_on(16);
+    EXPECT_EQ(said, "resumed the first pass and what was measured of 3 of " +
+                        std::to_string(second.hybrid.stream->slabs()) + " slabs\n");
+    for (const std::size_t number : {1, 2}) {
+      const SolidStream::Slab slab = second.hybrid.stream->slab(number);
+      expect_same_samples(slab, whole.hybrid.solid);
+      expect_same_function(slab, second.hybrid.stream->printed(slab), whole.hybrid.printed, bounds(mesh),
+                           *params.voxel_mm);
+    }
+  }
+  {
+    Outcome third = go_on(16);
+    third.hybrid.stream->finish(third.report);  // makes the slabs that nobody has asked for in any of the runs
+    expect_same_report(third.report, whole.report);
+    EXPECT_GE(third.report.solid.ties, 2);
+  }
+  // Slabs may be others by then.
+  Outcome fourth = go_on(24);
+  EXPECT_EQ(said.substr(0, 24), "resumed the first pass a");
+  fourth.hybrid.stream->finish(fourth.report);
+  expect_same_report(fourth.report, whole.report);
 }
 
 TEST(SolidStream, more_memory_makes_fewer_slabs_and_all_are_covered) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,12 +14,15 @@
 
 namespace fibrolite {
 
+class KeptWork;  // kept_work.h
+
 enum class SliceFormat {
   PngZip,  ///< .zip: an 8-bit grey PNG per layer (row 0 on top: y points up), and manifest.json.
   Sl1,     ///< .sl1: PNGs with config.ini and prusaslicer.ini, as PrusaSlicer and Prusa's resin printers read them.
   SvgZip,  ///< .svg.zip: an .svg per layer, in mm, and manifest.json.
   Svg,     ///< .svg: one file, a group per layer.
-  Cli      ///< .cli: Common Layer Interface 2.0, ASCII, units of 0.0001 mm; material to the left of its polylines.
+  Cli,     ///< .cli: Common Layer Interface 2.0, ASCII, units of 0.0001 mm; material to the left of its polylines.
+  ThreeMf  ///< .3mf: a slice stack (3MF Slice Extension 1.0), with a box for a mesh; mm, four decimals.
 };
 /// By the ending, without case. @throws Error Unsupported: none of the above.
 [[nodiscard]] SliceFormat slice_format(const std::filesystem::path& path);
@@ -50,6 +54,9 @@ struct SliceJob {
   /// If given, what is cut instead of `shape`, for work that is never whole in memory: called for each plate with the
   /// first layer that is not yet written, in order.
   std::function<LayerRun(const SlicePlate& plate, int first)> run_from{};
+  /// If given, layers are kept there as they are finished, and those that it holds are not made again. Its work must
+  /// name all that a layer depends on: what is cut, plates, planes and screen.
+  std::shared_ptr<KeptWork> kept{};
 };
 struct SlicedPlate {
   std::vector<double> area_mm2;  ///< Per layer.

@@ -2,6 +2,7 @@
 // The whole method on one screen.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -20,6 +21,8 @@
 
 namespace fibrolite {
 
+class KeptWork;  // kept_work.h
+
 struct HybridizeParams {
   Recipe recipe;
   InfillKind infill = InfillKind::Hybrid;
@@ -29,6 +32,9 @@ struct HybridizeParams {
   bool function = false;           ///< Also give the solid as a distance function (Hybrid::printed).
   /// Make no solid but one that comes slab by slab (Hybrid::stream). No mending, steps nor function.
   std::optional<SlabPlan> slabs{};
+  /// Where a solid in slabs keeps what it has found out, and looks for it. Its work must name model and params; the
+  /// slabs may be others.
+  std::shared_ptr<KeptWork> kept{};
 };
 struct Hybrid {
   Solid solid;  ///< The printed solid.

@@ -58,8 +58,8 @@ class SolidStream {
   [[nodiscard]] Slab slab(std::size_t number, const Context& context = {});
   /// As Hybrid::printed, good up to three voxels less than the margin beyond the slab.
   [[nodiscard]] Shape printed(const Slab& slab, const Context& context = {}) const;
-  /// After each slab has been asked for: what was measured, as hybridize() reports it of a whole solid.
-  void finish(Report& report) const;
+  /// What was measured, as hybridize() reports it of a whole solid. Slabs that nobody asked for are made first.
+  void finish(Report& report, const Context& context = {});
 
  private:
   std::shared_ptr<Impl> impl_;
