@@ -35,7 +35,21 @@ std::string first_line(const fs::path& log) {
   return line;
 }
 
+Run measure_band(const Case& c, const Options& options) {
+  Run run;
+  const fs::path log = options.out / "log.txt";
+  run.floor = fibrolite::bench::run(
+      {options.bin / "fibrolite-floor", c.model, std::to_string(c.size_mm), std::to_string(c.voxel_mm), "--band"}, log);
+  if (run.floor.exit_code != 0) {
+    run.failure = "floor: exit " + std::to_string(run.floor.exit_code) + ": " + first_line(log);
+  } else {
+    read_band(run, nlohmann::json::parse(run.floor.output));
+  }
+  return run;
+}
+
 Run measure(const Case& c, const Options& options) {
+  if (c.band) return measure_band(c, options);
   const fs::path solid = options.out / "solid.stl", report = options.out / "report.json", log = options.out / "log.txt";
   std::vector<std::string> command{options.bin / "fibrolite",
                                    "generate",
@@ -56,7 +70,8 @@ Run measure(const Case& c, const Options& options) {
                                    "--quiet"};
   for (const std::string& key : c.set) command.insert(command.end(), {"--set", key});
   if (!c.max_memory.empty()) command.insert(command.end(), {"--max-memory", c.max_memory});
-  if (options.threads > 0) command.insert(command.end(), {"--threads", std::to_string(options.threads)});
+  const int threads = c.threads > 0 ? c.threads : options.threads;
+  if (threads > 0) command.insert(command.end(), {"--threads", std::to_string(threads)});
   Run run;
   run.program = fibrolite::bench::run(command, log);
   fs::remove(solid);
@@ -100,6 +115,8 @@ int bench(const Options& options) {
     if (const auto found = done.find(c.beside); found != done.end()) {
       run.beside_cpu_s = found->second.compute_cpu_s;
       run.beside_realize = found->second.realize_per_voxel();
+      run.beside_compute_s = found->second.compute_s - found->second.partition_s;
+      run.beside_parallel_s = found->second.parallel_s;
     }
     if (run.failure.empty()) done.emplace(c.name, run);
     failed += run.failure.empty() ? 0 : 1;

@@ -90,6 +90,26 @@ std::vector<Case> suite(const SuiteParams& params) {
     slabs.beside = cases.back().name;
     slabs.goals = {.peak_rss_mb = 300 * 1.048576, .cpu_times = 1.8};
     cases.push_back(slabs);
+    Case alone = cases[cases.size() - 2];
+    alone.beside = alone.name;
+    alone.name += " alone";
+    alone.repeats = 1;
+    alone.threads = 1;
+    alone.goals = {.speed_up = 1.8};
+    cases.push_back(alone);
+    for (const double voxel_mm : {0.2, 0.1}) {
+      cases.push_back({.name = "band " + label(voxel_mm),
+                       .model = main_model,
+                       .voxel_mm = voxel_mm,
+                       .goals = {.band_speed_up = voxel_mm < 0.2 ? 5 : 3, .wide_times = 1.5},
+                       .band = true});
+    }
+    cases.push_back({.name = "tcs 0.1", .model = main_model, .voxel_mm = 0.1, .infill = "tcs", .goals = {}});
+    cases.push_back({.name = "hybrid 0.1",
+                     .model = main_model,
+                     .voxel_mm = 0.1,
+                     .goals = {.partition_s = 30, .compute_times = 1.6},
+                     .beside = "tcs 0.1"});
   }
   if (params.quick) {
     cases.push_back({.name = "hybrid 100", .model = main_model, .voxel_mm = 0.25, .goals = {}});

@@ -19,6 +19,11 @@ struct Goals {
   // Beside the case named Case::beside, in the same suite:
   std::optional<double> cpu_times{};      ///< CPU time of the compute stages.
   std::optional<double> realize_times{};  ///< CPU time of `realize` per active voxel.
+  std::optional<double> compute_times{};  ///< Wall time of the compute stages, those that decide the parts left out.
+  std::optional<double> speed_up{};       ///< At least: wall time of `realize` and `surface` here over theirs there.
+  // Of fibrolite-floor --band:
+  std::optional<double> band_speed_up{};  ///< At least: meshToLevelSet's wall time over to_solid()'s.
+  std::optional<double> wide_times{};     ///< Wall time of to_solid() with 1 mm inside over that with the band alone.
 };
 struct Case {
   std::string name;
@@ -31,6 +36,8 @@ struct Case {
   std::vector<std::string> set{};  ///< Recipe keys, as `--set` takes them.
   std::string beside{};            ///< An earlier case to compare with.
   std::string max_memory{};        ///< As `--max-memory` takes it.
+  int threads = 0;                 ///< 0: as all the others.
+  bool band = false;               ///< Not the program: the model to its band and back, beside OpenVDB's.
 };
 struct SuiteParams {
   std::filesystem::path assets;                 ///< Bundled models, .ply.

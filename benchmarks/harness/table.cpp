@@ -39,6 +39,7 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
     all_cpu_s += stage.cpu_s;
     if (stage.name == "joints") joints_cpu_s += stage.cpu_s;
     if (stage.name == "realize") run.realize_cpu_s += stage.cpu_s;
+    if (stage.name == "realize" || stage.name == "surface") run.parallel_s += stage.wall_s;
     if (moves_files(stage.name)) {
       run.files_s += stage.wall_s;
       continue;
@@ -54,19 +55,22 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
   run.floor_compute_cpu_s = floor.at("compute_cpu_s");
 }
 
+void read_band(Run& run, const nlohmann::json& band) {
+  run.level_set_s = band.at("level_set_s");
+  run.band_s = band.at("band_s");
+  run.wide_s = band.at("wide_band_s");
+  run.active_voxels = band.at("band_voxels");
+}
+
 void print_head() {
   std::printf("%-14s %-18s %6s %6s | %7s %7s %7s %7s | %7s %8s %8s | %8s %7s %7s %7s\n", "case", "model", "size",
               "voxel", "wall s", "CPU s", "compute", "files", "peak MB", "M voxels", "M tris", "floor s", "x floor",
               "x CPU", "process");
 }
 
-void print_row(const Case& c, const Run& run) {
-  const std::string model = c.model.stem().string();
-  if (!run.failure.empty()) {
-    std::printf("%-14s %-18s %6g %6g | %s\n", c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm,
-                run.failure.c_str());
-    return;
-  }
+namespace {
+
+void print_stages(const Case& c, const Run& run, const std::string& model) {
   std::printf("%-14s %-18s %6g %6g | %7.2f %7.2f %7.2f %7.2f | %7.0f %8.2f %8.2f | %8.2f %7.2f %7.2f %7.2f\n",
               c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.program.wall_s, run.program.cpu_s,
               run.compute_s, run.files_s, run.program.peak_rss_mb, run.active_voxels / 1e6, run.triangles / 1e6,
@@ -75,6 +79,23 @@ void print_row(const Case& c, const Run& run) {
   for (const Stage& stage : run.stages)
     line += "  " + stage.name + " " + number(stage.wall_s, 2) + "/" + number(stage.cpu_s, 2);
   std::printf("%s\n", line.c_str());
+}
+
+}  // namespace
+
+void print_row(const Case& c, const Run& run) {
+  const std::string model = c.model.stem().string();
+  if (!run.failure.empty()) {
+    std::printf("%-14s %-18s %6g %6g | %s\n", c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm,
+                run.failure.c_str());
+    return;
+  }
+  if (c.band) {
+    std::printf("%-14s %-18s %6g %6g | meshToLevelSet %.2f s, to_solid %.2f s, with 1 mm inside %.2f s\n",
+                c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.level_set_s, run.band_s, run.wide_s);
+  } else {
+    print_stages(c, run, model);
+  }
   bool met = true;
   for (const std::string& verdict : judge(c, run, met)) std::printf("    goal: %s\n", verdict.c_str());
   std::fflush(stdout);
@@ -89,6 +110,13 @@ std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
     verdicts.push_back(std::string(what) + " " + number(value, 2) + " of at most " +
                        number(*bound, *bound < 10 ? 1 : 0) + (ok ? ": ok" : ": missed"));
   };
+  const auto at_least = [&](const std::string& what, const std::optional<double>& bound, double value) {
+    if (!bound) return;
+    const bool ok = run.failure.empty() && value >= *bound;
+    met = met && ok;
+    verdicts.push_back(what + " " + number(value, 2) + " of at least " + number(*bound, 1) +
+                       (ok ? ": ok" : ": missed"));
+  };
   one("compute / floor", c.goals.floor_ratio, run.compute_ratio());
   one("wall s", c.goals.wall_s, run.program.wall_s);
   one("partition and verification s", c.goals.partition_s, run.partition_s);
@@ -98,6 +126,13 @@ std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
     const std::string over = " / " + c.beside;
     one(("compute CPU" + over).c_str(), c.goals.cpu_times, run.compute_cpu_s / run.beside_cpu_s);
     one(("realize CPU per voxel" + over).c_str(), c.goals.realize_times, run.realize_per_voxel() / run.beside_realize);
+    one(("compute without what decides parts" + over).c_str(), c.goals.compute_times,
+        (run.compute_s - run.partition_s) / run.beside_compute_s);
+    at_least("realize and surface, time alone" + over, c.goals.speed_up, run.parallel_s / run.beside_parallel_s);
+  }
+  if (run.band_s > 0) {
+    at_least("meshToLevelSet / to_solid", c.goals.band_speed_up, run.level_set_s / run.band_s);
+    one("1 mm inside / band alone", c.goals.wide_times, run.wide_s / run.band_s);
   }
   return verdicts;
 }
@@ -110,6 +145,14 @@ nlohmann::json to_json(const Case& c, const Run& run) {
                       {"beside", c.beside},   {"max_memory", c.max_memory}};
   if (!run.failure.empty()) {
     json["failure"] = run.failure;
+    return json;
+  }
+  json["threads"] = c.threads;
+  if (c.band) {
+    json["band"] = {{"level_set_s", run.level_set_s}, {"band_s", run.band_s}, {"wide_band_s", run.wide_s}};
+    bool met = true;
+    json["goals"] = judge(c, run, met);
+    json["met"] = met;
     return json;
   }
   json["stages"] = nlohmann::json::array();

@@ -26,8 +26,11 @@ struct Run {
   double realize_cpu_s = 0;
   double active_voxels = 0, triangles = 0;
   double floor_compute_s = 0, floor_compute_cpu_s = 0;
-  double beside_cpu_s = 0, beside_realize = 0;  ///< Of the case to compare with; 0: none was run.
-  std::string failure;                          ///< Empty if both ended well.
+  double parallel_s = 0;                           ///< Wall time of `realize` and `surface`.
+  double level_set_s = 0, band_s = 0, wide_s = 0;  ///< Of a case that is a band.
+  // Of the case to compare with; 0: none was run.
+  double beside_cpu_s = 0, beside_realize = 0, beside_compute_s = 0, beside_parallel_s = 0;
+  std::string failure;  ///< Empty if both ended well.
 
   [[nodiscard]] double compute_ratio() const { return compute_s / floor_compute_s; }
   [[nodiscard]] double cpu_ratio() const { return compute_cpu_s / floor_compute_cpu_s; }
@@ -36,6 +39,9 @@ struct Run {
 };
 /// Fill in what the program's report and the floor's answer say.
 void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& floor);
+
+/// The same of what `fibrolite-floor --band` says.
+void read_band(Run& run, const nlohmann::json& band);
 
 void print_head();
 void print_row(const Case& c, const Run& run);

@@ -21,8 +21,6 @@
 namespace fibrolite {
 namespace {
 
-constexpr int rounds = 3;  // as tie()
-
 Context quiet(const Context& context) { return context.part(0, 0, ""); }
 int& along(Vec3i& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -89,11 +87,11 @@ struct SolidStream::Impl {
         throw Error(Code::BadInput, "the mesh encloses no volume at this voxel", {},
                     "close it, give it thickness, or use a smaller --voxel");
       }
-      if (round == rounds || found.left.material.size() == 1 || !tie_loose(params, context)) break;
+      if (round == tie_rounds || found.left.material.size() == 1 || !tie_loose(params, context)) break;
     }
     for (int round = 0; params.neck_mm > 0; ++round) {
       std::vector<Piece> left;
-      if (!tie_necks(params, round < rounds, left, context)) {
+      if (!tie_necks(params, round < tie_rounds, left, context)) {
         made.tied.unreached = std::move(left);
         break;
       }
@@ -200,18 +198,19 @@ struct SolidStream::Impl {
   /// A strut along each neck that is too thin. What leaves the window counts as reached: only what the sweep found,
   /// which lies well within, is asked about.
   bool tie_necks(const TieParams& params, bool tie, std::vector<Piece>& left, const Context& context) {
+    const Shape there = capsules(made.tied.struts());
     std::vector<Capsule> struts;
     for (std::size_t i = 0; i < hanging.left.material.size(); ++i) {
       if (hanging.held[i]) continue;
       const Window around = window(hanging.boxes[i], params.reach_mm, context);
       const Shape anchor =
           unite({shell(distance_to(around.body), design.assembly.shell_mm), complement(cuboid(around.inner))});
-      for (const Unreached& one :
-           unreached(around.solid, anchor, {params.neck_mm, tie ? params.reach_mm : 0}, quiet(context))) {
+      for (const Unreached& one : unreached(around.solid, anchor, {params.neck_mm, params.reach_mm}, quiet(context))) {
         const auto same = [&](const Piece& p) { return p.sample_mm == one.piece.sample_mm; };
         if (std::any_of(left.begin(), left.end(), same)) continue;  // seen in another window
+        if (one.way && runs_in(*one.way, there)) continue;
         left.push_back(one.piece);
-        if (one.way) struts.push_back(strut(*one.way, params.strut_mm));
+        if (one.way && tie) struts.push_back(strut(*one.way, params.strut_mm));
       }
     }
     made.tied.necks += static_cast<std::int64_t>(struts.size());

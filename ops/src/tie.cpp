@@ -10,7 +10,6 @@
 namespace fibrolite {
 
 Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams& params, const Context& context) {
-  constexpr int rounds = 3;  // a strut may end on another loose piece, which the next round ties
   Tied result;
   TieChange change;
   CleanResult cleaned = clean(std::move(solid), params.clean, context);
@@ -19,21 +18,24 @@ Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams
     const Shape changed = with_ties(assembled, distance_to(body), {change}, params.keep_out);
     cleaned = clean(realize(changed, body, context), params.clean, context);
   };
-  for (int round = 0; round < rounds && cleaned.left.material.size() > 1; ++round) {
+  for (int round = 0; round < tie_rounds && cleaned.left.material.size() > 1; ++round) {
     const auto found = gaps(cleaned.solid, params.reach_mm, context);
     if (found.empty()) break;
     for (const Gap& gap : found) add(gap);
     make();
   }
   for (int round = 0; params.neck_mm > 0; ++round) {
-    const bool last = round == rounds;
-    const auto found =
-        unreached(cleaned.solid, params.anchor, {params.neck_mm, last ? 0 : params.reach_mm, params.keep_out}, context);
+    const Shape there = unite({params.held, capsules(change.struts)});
     const std::size_t before = change.struts.size();
-    for (const Unreached& one : found)
-      if (one.way) add(*one.way);
+    std::vector<Piece> left;
+    for (const Unreached& one :
+         unreached(cleaned.solid, params.anchor, {params.neck_mm, params.reach_mm, params.keep_out}, context)) {
+      if (one.way && runs_in(*one.way, there)) continue;
+      left.push_back(one.piece);
+      if (one.way && round < tie_rounds) add(*one.way);
+    }
     if (change.struts.size() == before) {
-      for (const Unreached& one : found) result.unreached.push_back(one.piece);
+      result.unreached = std::move(left);
       break;
     }
     result.necks += static_cast<std::int64_t>(change.struts.size() - before);
@@ -51,6 +53,10 @@ Capsule strut(const Gap& gap, double strut_mm) {
   const Vec3d along = gap.to_mm - gap.from_mm;
   const Vec3d root = 0.5 * strut_mm / std::max(norm(along), 1e-9) * along;
   return {gap.from_mm - root, gap.to_mm + root, 0.5 * strut_mm};
+}
+
+bool runs_in(const Gap& way, const Shape& struts) {
+  return struts(way.from_mm) < 0 && struts(0.5 * (way.from_mm + way.to_mm)) < 0 && struts(way.to_mm) < 0;
 }
 
 Shape with_ties(const Shape& whole, const Shape& body, const std::vector<TieChange>& changes, const Shape& keep_out) {
@@ -76,7 +82,9 @@ Tied and_then(const Tied& before, Tied now) {
 
 Tied tie_again(const Tied& before, const Solid& solid, const Solid& body, const TieParams& params,
                const Context& context) {
-  return and_then(before, tie(solid, distance_to(solid), body, params, context));
+  TieParams again = params;
+  again.held = unite({params.held, capsules(before.struts())});
+  return and_then(before, tie(solid, distance_to(solid), body, again, context));
 }
 
 namespace {

@@ -12,6 +12,9 @@
 
 namespace fibrolite {
 
+/// Of loose pieces, and of thin necks: a strut may end on what hangs loose itself, or leave a thin place beside it.
+inline constexpr int tie_rounds = 8;
+
 struct TieParams {
   double strut_mm = 0.8;  ///< Diameter of a tie; 2 voxels or more.
   double reach_mm = 12;   ///< Longest tie.
@@ -19,6 +22,7 @@ struct TieParams {
   double neck_mm = 0;  ///< What hangs on `anchor` by less is tied too; at most strut_mm; 0: anything holds.
   Shape anchor = everything();
   Shape keep_out = nothing();  ///< Where no tie may lie: drain holes.
+  Shape held = nothing();      ///< Ties of before. What a way through them leads to is reached.
 };
 /// First something is taken off (trim.h), then struts are added.
 struct TieChange {
@@ -38,12 +42,15 @@ struct Tied {
   [[nodiscard]] std::vector<Capsule> removed() const;  ///< Of all changes.
 };
 /// `assembled`: the composed shape the solid was made from; struts are united with it inside `body`. Loose pieces
-/// first, then thin necks, a few rounds each. Cost: as pieces() and unreached(), and a realize per round that finds
-/// something.
+/// first, then thin necks, at most tie_rounds each. Cost: as pieces() and unreached(), and a realize per round that
+/// finds something.
 [[nodiscard]] Tied tie(Solid solid, const Shape& assembled, const Solid& body, const TieParams& params = {},
                        const Context& context = {});
 /// What crosses a gap: grown into both its ends by half its diameter.
 [[nodiscard]] Capsule strut(const Gap& gap, double strut_mm);
+
+/// Whether a way lies in struts. They are as thick as asked for, also where samples two to a diameter cannot tell.
+[[nodiscard]] bool runs_in(const Gap& way, const Shape& struts);
 
 /// `whole` with these changes; struts only inside `body`, and not in `keep_out`.
 [[nodiscard]] Shape with_ties(const Shape& whole, const Shape& body, const std::vector<TieChange>& changes,
