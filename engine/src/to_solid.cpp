@@ -62,8 +62,7 @@ BandParams band_params(const ToSolidParams& params) {
   BandParams band;
   band.voxel_mm = params.grid.voxel_mm;
   band.outside_vox = params.grid.band_vox;
-  // A hundredth more, or rounding would put all that is deeper into the band about an inner face at inside_band_mm.
-  band.inside_vox = static_cast<float>(params.inside_band_mm / params.grid.voxel_mm) + params.grid.band_vox + 0.01F;
+  band.inside_vox = static_cast<float>(params.inside_band_mm / params.grid.voxel_mm) + params.grid.band_vox;
   return band;
 }
 

@@ -85,6 +85,8 @@ Shape clip(const FilledRegion& part, const AssembleParams& params) {
   return Shape(std::make_shared<const Clipped>(part, params.overlap_mm));
 }
 
+double depth_for_shell(double thickness_mm, double voxel_mm) { return thickness_mm + 0.01 * voxel_mm; }
+
 Shape shell(const Shape& body, double thickness_mm) {
   return Shape(std::make_shared<const Assembly>(body, nothing(), thickness_mm));
 }

@@ -87,7 +87,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     return out;
   }
   const Solid body = run("body", 0.60, [&](const Context& c) {
-    ToSolidResult made = to_solid(model.mesh, {.grid = grid, .inside_band_mm = shell_mm}, c);
+    ToSolidResult made = to_solid(model.mesh, {.grid = grid, .inside_band_mm = depth_for_shell(shell_mm, voxel)}, c);
     report.model.repairs.insert(report.model.repairs.end(), made.repairs.begin(), made.repairs.end());
     return made.solid;
   });

@@ -63,7 +63,8 @@ TEST(Assemble, what_is_far_from_a_face_is_no_active_voxel) {
   const double edge = 8, shell_mm = 1;
   const Mesh mesh = testing::cube(edge);
   for (const double voxel : {0.1, 0.0875, 0.075, 0.0625, 0.05, 0.04}) {
-    const Solid body = to_solid(mesh, {.grid = {.voxel_mm = voxel}, .inside_band_mm = shell_mm}).solid;
+    const Solid body =
+        to_solid(mesh, {.grid = {.voxel_mm = voxel}, .inside_band_mm = depth_for_shell(shell_mm, voxel)}).solid;
     const Solid solid = realize(shell(distance_to(body), shell_mm), body);
     const double faces = 6 * (edge * edge + (edge - 2) * (edge - 2)) / (voxel * voxel), band = 6;
     const double share = static_cast<double>(solid.active_voxels()) / (band * faces);

@@ -19,7 +19,7 @@ struct ToSolidParams {
   double inside_band_mm = 0;
 };
 struct ToSolidResult {
-  Solid solid;                       ///< Values in it: -(inside_band_mm + band) less 0.01 voxels, to +band.
+  Solid solid;                       ///< Interior background is -(max(inside_band_mm, 0) + band); exterior +band.
   std::vector<std::string> repairs;  ///< What had to be decided by winding number, in words; empty for a clean mesh.
 };
 /// @throws Error BadInput: the mesh encloses no volume (an open sheet, all triangles in one plane, thinner than the

@@ -20,6 +20,9 @@ struct FilledRegion {
 [[nodiscard]] Shape clip(const FilledRegion& part, const AssembleParams& params);
 /// The shell alone: max(b, -(b + t)), two isovalues of one distance.
 [[nodiscard]] Shape shell(const Shape& body, double thickness_mm);
+/// How deep a body must be told (ToSolidParams::inside_band_mm) for a shell: a hundredth of a voxel deeper than it is
+/// thick, or rounding would put all that is deeper into the band about the shell's inner face.
+[[nodiscard]] double depth_for_shell(double thickness_mm, double voxel_mm);
 /// max(b, min(-(b + t), min_i max(fill_i, p_i - overlap), joints)). Conservative: zero set and sign are right.
 /// Cost: one evaluation of b and, deeper than t/2, of the fills
 /// and joints near the block. Source: ours (docs/architecture.md); the paper's Sec. 5.2 and 6 as level-set operations.
