@@ -15,8 +15,11 @@ namespace {
 
 constexpr std::array<openvdb::Index, 3> stride{64, 8, 1};  // of x, y, z in a leaf's buffer
 
+/// A leaf's samples as bits: bit 8 y + z of word x.
+using Bits = std::array<std::uint64_t, 8>;
+
 /// All of `within` that hangs together with what is set in `grown`. Whole planes move at a time.
-void flood(LeafBits& grown, const LeafBits& within) {
+void flood(Bits& grown, const Bits& within) {
   constexpr std::uint64_t first_column = 0x0101010101010101U;
   for (bool changed = true; changed;) {
     changed = false;
@@ -35,17 +38,22 @@ void flood(LeafBits& grown, const LeafBits& within) {
   }
 }
 
-LeafLabels label_leaf(const LeafBits& inside) {
+LeafLabels label_leaf(const float* value, float below) {
   LeafLabels result;
-  result.inside = inside;
   result.label.fill(0);
-  LeafBits open;
+  Bits inside;
+  for (std::size_t x = 0; x < 8; ++x) {
+    std::uint64_t word = 0;
+    for (std::size_t i = 0; i < 64; ++i) word |= std::uint64_t{value[64 * x + i] < below} << i;
+    inside[x] = word;
+  }
+  Bits open;
   open.fill(~std::uint64_t{0});
   for (std::size_t x = 0; x < 8; ++x) {
     while (open[x] != 0) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(open[x]));
       const bool in = (inside[x] >> bit & 1U) != 0;
-      LeafBits within, grown{};
+      Bits within, grown{};
       for (std::size_t w = 0; w < 8; ++w) within[w] = open[w] & (in ? inside[w] : ~inside[w]);
       grown[x] = std::uint64_t{1} << bit;
       flood(grown, within);
@@ -66,8 +74,8 @@ LeafLabels label_leaf(const LeafBits& inside) {
 
 }  // namespace
 
-Components::Components(const Solid& solid, const Context& context, double skin_mm, const SampleRange* range)
-    : solid_(solid), skin_mm_(skin_mm) {
+Components::Components(const Solid& solid, const Context& context, float below, const SampleRange* range)
+    : solid_(solid), below_(below) {
   const Tree& tree = solid.impl().grid->tree();
   openvdb::CoordBBox box;
   tree.evalLeafBoundingBox(box);
@@ -105,9 +113,7 @@ std::vector<Components::Component> Components::list() const {
         const openvdb::Coord at =
             origin(b) + openvdb::Coord(static_cast<int>(first >> 6), static_cast<int>((first >> 3) & 7U),
                                        static_cast<int>(first & 7U));
-        const bool in =
-            block_[b] >= 0 ? holds(leaves_[static_cast<std::size_t>(block_[b])].inside, first) : block_[b] == full_tile;
-        result.push_back({root, in, 0, at});
+        result.push_back({root, inside(at), 0, at});
       }
       result[static_cast<std::size_t>(slot[root])].voxels += voxels;
     }
@@ -121,14 +127,6 @@ Components::Id Components::at(const openvdb::Coord& ijk) const {
   const std::size_t i = index(b);
   if (block_[i] < 0) return find(offset_[i]);
   return find(offset_[i] + leaves_[static_cast<std::size_t>(block_[i])].label[Leaf::coordToOffset(ijk)]);
-}
-
-bool Components::inside(const openvdb::Coord& ijk) const {
-  const openvdb::Coord b = openvdb::Coord(ijk.x() >> 3, ijk.y() >> 3, ijk.z() >> 3) - low_;
-  if (b.x() < 0 || b.y() < 0 || b.z() < 0 || b.x() >= n_.x() || b.y() >= n_.y() || b.z() >= n_.z()) return false;
-  const std::int32_t block = block_[index(b)];
-  return block < 0 ? block == full_tile
-                   : holds(leaves_[static_cast<std::size_t>(block)].inside, Leaf::coordToOffset(ijk));
 }
 
 openvdb::Coord Components::origin(std::size_t b) const {
@@ -174,8 +172,8 @@ void Components::label(const Context& context) {
   leaves_.resize(tree_leaves_.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
     if (context.cancelled()) return;
-    Skin skin(solid_.impl().grid->tree(), skin_mm_, solid_.grid().voxel_mm);
-    for (std::size_t i = range.begin(); i < range.end(); ++i) leaves_[i] = label_leaf(skin.below(*tree_leaves_[i]));
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      leaves_[i] = label_leaf(tree_leaves_[i]->buffer().data(), below_);
   });
   context.check();
   offset_.resize(block_.size() + 1);
@@ -222,19 +220,19 @@ void Components::join_faces(std::size_t a, std::size_t b, unsigned axis) {
     if (block_[a] == block_[b]) unite(offset_[a], offset_[b]);
     return;
   }
-  const LeafLabels* in_a = block_[a] >= 0 ? &leaves_[static_cast<std::size_t>(block_[a])] : nullptr;
-  const LeafLabels* in_b = block_[b] >= 0 ? &leaves_[static_cast<std::size_t>(block_[b])] : nullptr;
+  const float* va = block_[a] >= 0 ? tree_leaves_[static_cast<std::size_t>(block_[a])]->buffer().data() : nullptr;
+  const float* vb = block_[b] >= 0 ? tree_leaves_[static_cast<std::size_t>(block_[b])]->buffer().data() : nullptr;
   const unsigned s = stride[axis], u = stride[(axis + 1) % 3], v = stride[(axis + 2) % 3];
   Id last_a = 0, last_b = 0;
   bool any = false;
   for (unsigned i = 0; i < 8; ++i) {
     for (unsigned j = 0; j < 8; ++j) {
       const unsigned pa = 7 * s + i * u + j * v, pb = i * u + j * v;
-      const bool ia = in_a != nullptr ? holds(in_a->inside, pa) : block_[a] == full_tile;
-      const bool ib = in_b != nullptr ? holds(in_b->inside, pb) : block_[b] == full_tile;
+      const bool ia = va != nullptr ? va[pa] < below_ : block_[a] == full_tile;
+      const bool ib = vb != nullptr ? vb[pb] < below_ : block_[b] == full_tile;
       if (ia != ib) continue;
-      const Id la = offset_[a] + (in_a != nullptr ? in_a->label[pa] : 0U);
-      const Id lb = offset_[b] + (in_b != nullptr ? in_b->label[pb] : 0U);
+      const Id la = offset_[a] + (va != nullptr ? leaves_[static_cast<std::size_t>(block_[a])].label[pa] : 0U);
+      const Id lb = offset_[b] + (vb != nullptr ? leaves_[static_cast<std::size_t>(block_[b])].label[pb] : 0U);
       if (any && la == last_a && lb == last_b) continue;  // neighbours on a face mostly repeat
       unite(la, lb);
       last_a = la;

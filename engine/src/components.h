@@ -12,7 +12,6 @@
 #include "fibrolite/context.h"
 #include "fibrolite/pieces.h"
 #include "fibrolite/solid.h"
-#include "skin.h"
 #include "vdb_access.h"
 
 namespace fibrolite {
@@ -23,19 +22,18 @@ struct LeafLabels {
   std::array<std::uint16_t, size> label;
   std::vector<std::uint16_t> voxels;  // per label
   std::vector<std::uint16_t> first;   // per label: its first voxel
-  LeafBits inside;
 };
 
-/// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what is left
-/// when a skin has been taken off (skin.h). Of a range, only its blocks are looked at, and there is no layer beyond its
-/// two ends: what lies there is not known; a skin is taken off by what the solid holds there.
+/// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what reads less
+/// than `below`, 0 or a depth within the band. Of a range, only its blocks are looked at, and there is no layer beyond
+/// its two ends: what lies there is not known.
 class Components {
  public:
   using Tree = openvdb::FloatTree;
   using Leaf = Tree::LeafNodeType;
   using Id = std::uint32_t;
 
-  Components(const Solid& solid, const Context& context, double skin_mm = 0, const SampleRange* range = nullptr);
+  Components(const Solid& solid, const Context& context, float below = 0, const SampleRange* range = nullptr);
 
   [[nodiscard]] bool empty() const { return offset_.empty(); }
 
@@ -50,7 +48,9 @@ class Components {
 
   /// Root id of a sample; samples outside the box belong to the exterior.
   [[nodiscard]] Id at(const openvdb::Coord& ijk) const;
-  [[nodiscard]] bool inside(const openvdb::Coord& ijk) const;
+  [[nodiscard]] bool inside(const openvdb::Coord& ijk) const {
+    return solid_.impl().grid->tree().getValue(ijk) < below_;
+  }
 
   /// Calls visit(origin, leaf labels or null for a tile, global id of label 0) for each block, in scan order.
   template <class Visit>
@@ -81,7 +81,7 @@ class Components {
   Id root_of(Id i);
 
   Solid solid_;
-  double skin_mm_;
+  float below_;
   openvdb::Coord low_, n_;
   std::vector<std::int32_t> block_;  // leaf number or a tile kind
   std::vector<const Leaf*> tree_leaves_;

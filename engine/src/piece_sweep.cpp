@@ -108,7 +108,7 @@ struct PieceSweep::Impl {
   }
 
   [[nodiscard]] Components components_of(const Solid& solid, const SampleRange& range, const Context& context) const {
-    return {solid, context, params.skin_mm, &range};
+    return {solid, context, -static_cast<float>(params.skin_mm), &range};
   }
   void add(const Components& components, const SampleRange& range, const Shape& anchor) {
     std::map<std::pair<int, int>, Face> next;

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
 
 #include "components.h"
 #include "fibrolite/disjoint_sets.h"
@@ -19,8 +18,6 @@ namespace {
 using openvdb::Coord;
 using Leaf = Components::Leaf;
 using Id = Components::Id;
-
-constexpr double told_beyond = 0.5;  ///< Voxels that values must be told deeper than the skin.
 
 /// Of the components inside, which hold a sample where the anchor is negative. Sorted by id.
 struct Anchored {
@@ -66,86 +63,51 @@ Anchored find_anchored(const Components& components, const std::vector<Component
   return found;
 }
 
-/// Whether samples are deeper than a skin, by their values or, next to a ridge, by its depth, or between two that are:
-/// where a bar runs into a wall, no sample may tell how deep it is.
+/// Whether samples are as deep as asked for, by their values or, where those may understate it, by the distance to
+/// where the lattice's edges cross the surface.
 class Depth {
  public:
-  enum class By {
-    Values,   ///< They understate it where shapes were united.
-    Surface,  ///< By the distance to where the lattice's edges cross it, if the values are not enough.
-  };
-  Depth(const Solid& solid, double skin_mm)
+  Depth(const Solid& solid, double depth_mm)
       : access_(solid.impl().grid->tree()),
-        voxel_mm_(static_cast<float>(solid.grid().voxel_mm)),
-        skin_vox_(static_cast<float>(skin_mm / solid.grid().voxel_mm)),
-        reach_(static_cast<int>(std::ceil(skin_vox_)) + 1) {}
+        depth_mm_(static_cast<float>(depth_mm)),
+        depth_vox_(depth_mm / solid.grid().voxel_mm),
+        reach_(static_cast<int>(std::ceil(depth_vox_))) {}
 
   [[nodiscard]] bool inside(const Coord& at) { return access_.getValue(at) < 0; }
-  [[nodiscard]] bool deep(const Coord& at, By by) {
-    if (beside_ridge(at, by)) return true;
-    if ((by == By::Values ? told(at) : measured(at)) > least()) return false;
-    return std::any_of(lattice_lines.begin(), lattice_lines.end(), [&](const LatticeLine& line) {
-      return beside_ridge(at.offsetBy(line.x, line.y, line.z), by) &&
-             beside_ridge(at.offsetBy(-line.x, -line.y, -line.z), by);
-    });
+  [[nodiscard]] bool deep(const Coord& at) {
+    const float value = access_.getValue(at);
+    if (value < -depth_mm_ || value >= 0) return value < 0;
+    for (int x = -reach_ - 1; x <= reach_; ++x) {
+      for (int y = -reach_ - 1; y <= reach_; ++y) {
+        for (int z = -reach_ - 1; z <= reach_; ++z)
+          if (crossed(at, {x, y, z})) return false;
+      }
+    }
+    return true;
   }
 
  private:
-  [[nodiscard]] bool beside_ridge(const Coord& at, By by) {
-    if (told(at) >= 0) return false;
-    const auto [known, added] = deep_[by == By::Values ? 0 : 1].try_emplace(at, false);
-    if (!added) return known->second;
-    if (by == By::Values) {
-      const auto value = [&](int x, int y, int z) { return told(at.offsetBy(x, y, z)); };
-      return known->second = told(at) <= least() && ridge_depth(value, skin_vox_) >= skin_vox_;
-    }
-    // Crossings lie apart: the nearest is farther than the surface by so much along a bar.
-    const float enough = skin_vox_ + 0.15F;
-    const auto value = [&](int x, int y, int z) { return measured(at.offsetBy(x, y, z)); };
-    return known->second =
-               beside_ridge(at, By::Values) || (measured(at) <= least() && ridge_depth(value, enough) >= enough);
-  }
-  /// What is nearer to the surface is not needed for a chain.
-  [[nodiscard]] float least() const { return static_cast<float>(half_diagonal - ridge_slack) - skin_vox_; }
-  [[nodiscard]] float told(const Coord& at) { return access_.getValue(at) / voxel_mm_; }
-  /// Distance to the surface, voxels, negative inside; what is deeper than can matter is as deep as that.
-  float measured(const Coord& at) {
-    const float value = told(at), deepest = static_cast<float>(reach_) + 1;
-    if (value >= 0 || value < -deepest) return value;
-    const auto [known, added] = measured_.try_emplace(at, value);
-    if (added) known->second = std::min(value, -nearest_crossing(at, deepest));
-    return known->second;
-  }
-  [[nodiscard]] float nearest_crossing(const Coord& at, float most) {
-    float square = most * most;
-    for (int x = -reach_ - 1; x <= reach_; ++x) {
-      for (int y = -reach_ - 1; y <= reach_; ++y) {
-        for (int z = -reach_ - 1; z <= reach_; ++z) look(at, {x, y, z}, square);
-      }
-    }
-    return std::sqrt(square);
-  }
-  /// The three edges that start at a sample.
-  void look(const Coord& at, const std::array<int, 3>& from, float& square) {
+  /// Does one of the three edges that start at a sample cross the surface within the depth?
+  [[nodiscard]] bool crossed(const Coord& at, const std::array<int, 3>& from) {
     const float a = access_.getValue(at.offsetBy(from[0], from[1], from[2]));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::array<int, 3> to = from;
       ++to[axis];
       const float b = access_.getValue(at.offsetBy(to[0], to[1], to[2]));
       if ((a < 0) == (b < 0)) continue;
-      float sum = 0;
+      double square = 0;
       for (std::size_t k = 0; k < 3; ++k) {
-        const float d = static_cast<float>(from[k]) + (k == axis ? a / (a - b) : 0);
-        sum += d * d;
+        const double d = from[k] + (k == axis ? static_cast<double>(a) / (a - b) : 0);
+        square += d * d;
       }
-      square = std::min(square, sum);
+      if (square < depth_vox_ * depth_vox_) return true;
     }
+    return false;
   }
 
   openvdb::FloatGrid::ConstUnsafeAccessor access_;
-  std::unordered_map<Coord, float> measured_;
-  std::array<std::unordered_map<Coord, bool>, 2> deep_;
-  float voxel_mm_, skin_vox_;
+  float depth_mm_;
+  double depth_vox_;
   int reach_;
 };
 
@@ -160,13 +122,19 @@ class Regrown {
             const Context& context) {
     sets_ = DisjointSets(unreached.size() + 1);
     samples_.resize(unreached.size());
-    for (const Depth::By by : {Depth::By::Values, Depth::By::Surface}) {
-      for (std::size_t i = 0; i < unreached.size(); ++i) {
-        context.check();
-        if (set_of(i) != 0) flood(unreached[i], static_cast<std::uint32_t>(i + 1), by);
-      }
-      for (std::size_t i = 0; i < unreached.size(); ++i)
-        if (set_of(i) != 0 && any_inside(anchor, samples_[i], voxel_mm)) reach(static_cast<std::uint32_t>(i + 1));
+    for (std::size_t i = 0; i < unreached.size(); ++i) {
+      context.check();
+      flood(unreached[i], static_cast<std::uint32_t>(i + 1));
+    }
+    std::vector<Vec3d> points;
+    std::vector<float> value;
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      points.clear();
+      for (const Coord& at : samples_[i]) points.push_back(world_mm(at, voxel_mm));
+      value.resize(points.size());
+      anchor.evaluate(points, value);
+      if (std::any_of(value.begin(), value.end(), [](float v) { return v < 0; }))
+        sets_.join(0, static_cast<std::uint32_t>(i + 1));
     }
   }
 
@@ -181,38 +149,26 @@ class Regrown {
   void reach(std::uint32_t set) { sets_.join(0, set); }
 
  private:
-  static bool any_inside(const Shape& anchor, const std::vector<Coord>& samples, double voxel_mm) {
-    std::vector<Vec3d> points;
-    for (const Coord& at : samples) points.push_back(world_mm(at, voxel_mm));
-    std::vector<float> value(points.size());
-    anchor.evaluate(points, value);
-    return std::any_of(value.begin(), value.end(), [](float v) { return v < 0; });
-  }
-
-  /// Until it meets what is reached.
-  void flood(const Components::Component& from, std::uint32_t mine, Depth::By by) {
+  void flood(const Components::Component& from, std::uint32_t mine) {
     std::vector<Coord>& stack = samples_[mine - 1];  // of which the first `done` have been looked around from
-    if (stack.empty()) {
-      if (const std::int32_t taken = owner_.getValue(from.first); taken > 0) {
-        sets_.join(static_cast<std::uint32_t>(taken), mine);
-        return;
-      }
-      stack.push_back(from.first);
-      owner_.setValue(from.first, static_cast<std::int32_t>(mine));
+    if (const std::int32_t taken = owner_.getValue(from.first); taken > 0) {
+      sets_.join(static_cast<std::uint32_t>(taken), mine);
+      return;
     }
+    stack.push_back(from.first);
+    owner_.setValue(from.first, static_cast<std::int32_t>(mine));
     for (std::size_t done = 0; done < stack.size(); ++done) {
       for (const auto& s : face_steps) {
         const Coord to = stack[done].offsetBy(s[0], s[1], s[2]);
         if (const std::int32_t taken = owner_.getValue(to); taken > 0) {
           sets_.join(static_cast<std::uint32_t>(taken), mine);
-          if (sets_.root(mine) == 0) return;
           continue;
         }
-        if (!depth_.deep(to, by)) continue;
+        if (!depth_.deep(to)) continue;
         if (const std::size_t slot = anchored_.slot(components_.at(to));
             slot < anchored_.ids.size() && anchored_.reached[slot]) {
           sets_.join(0, mine);
-          return;
+          continue;
         }
         owner_.setValue(to, static_cast<std::int32_t>(mine));
         stack.push_back(to);
@@ -230,15 +186,23 @@ class Regrown {
 
 }  // namespace
 
+namespace {
+
+/// Samples within half a cube's diagonal of a line make a chain of neighbours along it: those whose cubes it passes.
+constexpr double half_diagonal = 0.8661;
+constexpr double told_beyond = 0.5;  ///< Voxels that values must be told deeper than the skin.
+
+}  // namespace
+
 double skin_mm(double neck_mm, Grid grid) {
   const double told = std::max(grid.band_vox, grid.inside_vox) - told_beyond;
-  return std::clamp(0.5 * neck_mm - ridge_slack * grid.voxel_mm, 0.0, told * grid.voxel_mm);
+  return std::clamp(0.5 * neck_mm - half_diagonal * grid.voxel_mm, 0.0, told * grid.voxel_mm);
 }
 
 Grid telling(double neck_mm, Grid grid) {
   // A block without a value of its own is at least this deep in its middle.
   const float most = grid.band_vox + 3.5F;
-  const auto needed = static_cast<float>(0.5 * neck_mm / grid.voxel_mm - ridge_slack + told_beyond);
+  const auto needed = static_cast<float>(0.5 * neck_mm / grid.voxel_mm - half_diagonal + told_beyond);
   grid.inside_vox = needed > grid.band_vox ? std::min(needed, most) : 0;
   return grid;
 }
@@ -248,7 +212,7 @@ std::vector<Unreached> unreached(const Solid& solid, const Shape& anchor, const 
   const Grid grid = solid.grid();
   const double voxel = grid.voxel_mm;
   const double depth_mm = skin_mm(params.neck_mm, grid);
-  const Components components(solid, context, depth_mm);
+  const Components components(solid, context, -static_cast<float>(depth_mm));
   if (components.empty()) return {};
   auto list = components.list();
   const Anchored anchored = find_anchored(components, list, anchor, voxel);

@@ -112,8 +112,7 @@ struct SolidStream::Impl {
     for (const Sticks& part : sticks) along_sticks.emplace_back(part, design.assembly.shell_mm, grid.voxel_mm);
     for (std::size_t i = 0; i < measured.size(); ++i) {
       context.check();
-      const int beyond = params.neck_mm > 0 ? 8 : 0;  // what a skin is judged by
-      const Solid body_here = body(i, beyond, quiet(context)), solid = raw(body_here, quiet(context));
+      const Solid body_here = body(i, 0, quiet(context)), solid = raw(body_here, quiet(context));
       for (StickSweep& part : along_sticks) part.add(body_here, solid, range(i), quiet(context));
       pieces.add(solid, range(i).low, range(i).high, nothing(), quiet(context));
       if (params.neck_mm > 0) {

@@ -37,7 +37,7 @@ class PieceSweep {
   };
   PieceSweep(Grid grid, const Params& params);
   /// The next slab: the blocks of 8 with low <= sample[axis] < high; both multiples of 8, each slab next to the one
-  /// before. What `solid` holds beyond is not looked at, but for the two layers of samples that a skin is judged by.
+  /// before. What `solid` holds beyond is not looked at.
   /// Pieces with a sample where `anchor` is negative are held. Cost: as pieces(), plus the slab's last layer of samples
   /// in memory.
   void add(const Solid& solid, int low, int high, const Shape& anchor = nothing(), const Context& context = {});

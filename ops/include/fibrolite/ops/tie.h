@@ -13,7 +13,7 @@
 namespace fibrolite {
 
 /// Of loose pieces, and of thin necks: a strut may end on what hangs loose itself, or leave a thin place beside it.
-inline constexpr int tie_rounds = 8;
+inline constexpr int tie_rounds = 3;
 
 struct TieParams {
   double strut_mm = 0.8;  ///< Diameter of a tie; 2 voxels or more.
