@@ -199,7 +199,8 @@ void add_generate_command(CLI::App& program) {
   add_options(command, options->output, endings);
   add_infill(command, options->infill);
   add_voxel(command, options->voxel_mm,
-            "Voxel edge (default: the smaller of longest side / 400 and the recipe's thinnest feature / 3)");
+            "Voxel edge (default: the smallest of longest side / 400, the recipe's thinnest feature / 3, and what "
+            "necks of print.wall_mm are told at)");
   add_options(command, options->recipe);
   add_pictures(command, options->pictures);
   add_file(command, "--steps", options->steps, ".vdb", "Every step as a named grid");

@@ -199,6 +199,8 @@ double skin_mm(double neck_mm, Grid grid) {
   return std::clamp(0.5 * neck_mm - half_diagonal * grid.voxel_mm, 0.0, told * grid.voxel_mm);
 }
 
+double coarsest_voxel(double neck_mm, double held_mm) { return 0.5 * (neck_mm - held_mm) / half_diagonal; }
+
 Grid telling(double neck_mm, Grid grid) {
   // A block without a value of its own is at least this deep in its middle.
   const float most = grid.band_vox + 3.5F;

@@ -77,7 +77,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const double neck_mm = tie_params(recipe, params.infill, everything(), voxel).neck_mm;
   const Grid grid = telling(neck_mm, {.voxel_mm = voxel});
   const double shell_mm = recipe.shell.thickness_mm;
-  report.solid.neck_mm = 2 * skin_mm(neck_mm, grid);
+  report_necks(neck_mm, grid, recipe.print, report);
   const AssembleParams assembly{.shell_mm = shell_mm, .overlap_mm = voxel};
   if (params.slabs) {
     out.stream = run("pieces", 1.0, [&](const Context& c) {

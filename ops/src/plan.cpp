@@ -10,11 +10,15 @@
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/solid_stream.h"
+#include "fibrolite/reach.h"
 
 namespace fibrolite {
 
 double choose_voxel(const Box3d& model, const Recipe& recipe, InfillKind infill, std::optional<double> wanted) {
-  return wanted ? *wanted : std::min(model.longest_side() / 400, thinnest_mm(recipe, infill) / 3);
+  if (wanted) return *wanted;
+  const double thinnest = thinnest_mm(recipe, infill), held = coarsest_voxel(thinnest, recipe.print.wall_mm);
+  const double voxel = std::min(model.longest_side() / 400, thinnest / 3);
+  return held < thinnest / 4 ? voxel : std::min(voxel, held);
 }
 
 namespace {

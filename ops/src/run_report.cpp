@@ -5,6 +5,7 @@
 
 #include "fibrolite/ops/text.h"
 #include "fibrolite/pieces.h"
+#include "fibrolite/reach.h"
 #include "run.h"
 
 namespace fibrolite {
@@ -97,6 +98,21 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
     append(report.warnings, joint.warnings);
     if (row.capacity_over_demand < 1) report.warnings.push_back(too_weak(row, recipe.material.yield_mpa));
   }
+}
+
+void report_necks(double thinnest_mm, Grid grid, const PrintParams& limits, Report& report) {
+  const double told = 2 * skin_mm(thinnest_mm, grid);
+  report.solid.neck_mm = told;
+  if (thinnest_mm <= 0 || told >= limits.wall_mm * (1 - 1e-6)) return;
+  const double voxel = coarsest_voxel(thinnest_mm, limits.wall_mm);
+  std::string remedy = "use thicker members, or a smaller print.wall_mm";
+  if (grid.voxel_mm < voxel)
+    remedy = "use a coarser --voxel";
+  else if (voxel > 0)
+    remedy = "use --voxel " + number_text(std::floor(1e3 * voxel) / 1e3) + " or less";
+  report.warnings.push_back("solid.neck_mm: necks were looked for below " + number_text(told, 2) +
+                            " mm only, which is thinner than print.wall_mm, " + number_text(limits.wall_mm) + " mm; " +
+                            remedy);
 }
 
 void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,

@@ -197,6 +197,24 @@ TEST(Generate, ADryRunSaysWhatTheRunWillTake) {
   EXPECT_LT(four_times, 10 * once);
 }
 
+TEST(Generate, TheVoxelChosenByItselfTellsNecksOfAWallAndACoarserOneSaysThatItDoesNot) {
+  const auto ran = [](const std::vector<std::string>& voxel) {
+    const TempDir folder;
+    std::vector<std::string> arguments{"generate", asset("molar"), "--size", "100",
+                                       "--infill", "tcs",          "-o",     folder / "a.stl"};
+    arguments.insert(arguments.end(), voxel.begin(), voxel.end());
+    run(arguments);
+    return report_in(folder / "a.report.json");
+  };
+  const json chosen = ran({}), coarse_run = ran({"--voxel", "0.4"});
+  EXPECT_LT(chosen["solid"]["voxel_mm"], 0.25);  // a 400th of the side
+  EXPECT_NEAR(chosen["solid"]["neck_mm"], 0.4, 1e-6);
+  EXPECT_THAT(chosen["warnings"], IsEmpty());
+  EXPECT_LT(coarse_run["solid"]["neck_mm"], 0.2);
+  ASSERT_EQ(coarse_run["warnings"].size(), 1U);
+  EXPECT_THAT(coarse_run["warnings"][0].get<std::string>(), HasSubstr("use --voxel 0.23 or less"));
+}
+
 TEST(Generate, WhatNeedsTheWholeSolidIsRefusedIfItDoesNotFit) {
   const TempDir folder;
   const auto refused = [&](const std::string& output, const std::vector<std::string>& more) {

@@ -56,6 +56,12 @@ TEST(Unreached, a_neck_is_judged_the_same_in_all_directions) {
   }
 }
 
+TEST(Unreached, the_coarsest_voxel_is_the_one_that_tells_what_is_held) {
+  EXPECT_NEAR(coarsest_voxel(0.8, 0.4), 0.231, 0.0005);
+  EXPECT_NEAR(2 * skin_mm(0.8, {.voxel_mm = coarsest_voxel(0.8, 0.4)}), 0.4, 1e-9);
+  EXPECT_LE(coarsest_voxel(0.4, 0.4), 0);
+}
+
 TEST(Unreached, values_told_deeper_than_the_band_are_no_more_once_narrowed) {
   const Shape ball = sphere({0.1, 0.1, 0.1}, 4);
   const Solid deep = realize(ball, Box3d{{-5, -5, -5}, {5, 5, 5}}, telling(3, grid)), plain = make(ball);

@@ -80,7 +80,7 @@ TEST(Hybridize, a_graded_crystal_has_the_wanted_density_in_the_mean) {
   const Mesh mesh = model("rounded_box");
   HybridizeParams params;
   params.infill = InfillKind::Tcs;
-  params.voxel_mm = 0.25;
+  params.voxel_mm = 0.23;
   for (const TcsForm form : {TcsForm::Sticks, TcsForm::Network}) {
     params.recipe.tcs = {.form = form, .density = 0.2, .grade = TcsGrade::Surface, .grade_most = 1.4};
     const Outcome made = hybridized(mesh, params);
@@ -93,7 +93,8 @@ TEST(Hybridize, a_graded_crystal_has_the_wanted_density_in_the_mean) {
   params.recipe.tcs.density = 0.13;
   params.recipe.tcs.grade_most = 2;
   const Report thick = hybridized(mesh, params).report;
-  EXPECT_THAT(thick.warnings, ElementsAre(HasSubstr("tcs.density: 0.13 was asked for, 0.1")));
+  EXPECT_THAT(thick.warnings,
+              ElementsAre(HasSubstr("tcs.density: 0.13 was asked for, 0.1"), HasSubstr("solid.neck_mm: necks were")));
   EXPECT_GT(thick.parts.at(0).infill_volume_mm3, 1.02 * 0.13 * thick.parts.at(0).lumen_mm3);
 }
 

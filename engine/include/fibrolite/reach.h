@@ -26,6 +26,8 @@ struct Unreached {
 /// as the grid's values tell. It is the deepest for which a member as wide as the neck keeps a chain of neighbouring
 /// samples, however it lies on the lattice.
 [[nodiscard]] double skin_mm(double neck_mm, Grid grid);
+/// Coarsest voxel, mm, at which necks thinner than held_mm are told from members of neck_mm; 0 or less if none does.
+[[nodiscard]] double coarsest_voxel(double neck_mm, double held_mm);
 /// The grid with values inside told as deep as that takes, but never deeper than 3.5 voxels below the band.
 [[nodiscard]] Grid telling(double neck_mm, Grid grid);
 /// Material that hangs on `anchor` (where that is negative) only through necks clearly thinner than neck_mm, largest

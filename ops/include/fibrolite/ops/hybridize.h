@@ -26,7 +26,7 @@ class KeptWork;  // kept_work.h
 struct HybridizeParams {
   Recipe recipe;
   InfillKind infill = InfillKind::Hybrid;
-  std::optional<double> voxel_mm;  ///< Default: min(longest side / 400, thinnest feature / 3).
+  std::optional<double> voxel_mm;  ///< Default: choose_voxel().
   bool fix = false;                ///< Mend what the print checks find (mend.h).
   bool steps = false;              ///< Also realize every step as a grid of its own.
   bool function = false;           ///< Also give the solid as a distance function (Hybrid::printed).
@@ -62,7 +62,8 @@ struct Hybrid {
 [[nodiscard]] Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& report,
                                const Context& context = {});
 
-/// The voxel a run will use, mm.
+/// The voxel a run will use, mm: the wanted one, or the smallest of a 400th of the longest side, a third of the
+/// thinnest feature and, down to a quarter of it, what necks of print.wall_mm are told at.
 [[nodiscard]] double choose_voxel(const Box3d& model, const Recipe& recipe, InfillKind infill,
                                   std::optional<double> wanted);
 /// What a run will come to, from area, volume, voxel and recipe, before anything is allocated; within some 30 % where
