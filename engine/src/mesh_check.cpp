@@ -43,6 +43,8 @@ class Sets {
     }
   }
 
+  bool is_root(std::uint32_t a) const { return parent_[a] == a; }
+
   void join(std::uint32_t a, std::uint32_t b) {
     for (;;) {
       a = root(a);
@@ -93,16 +95,16 @@ class Checker {
     }
     result_.triangles += static_cast<std::int64_t>(layer.triangles.size());
     result_.volume_mm3 += signed_volume(layer, from_);
-    const std::vector<std::uint32_t> id = name_vertices(layer);
-    for (Triangle& t : triangles_)
-      for (std::uint32_t& v : t.corners)
-        if (v >= layer.first) v = id[v - layer.first];
-    append(layer, id);
+    names_ = name_vertices(layer);
+    append(layer);
     end_ = layer.first + layer.before;
     if (first_ < end_) {
       visit_all();
       keep_open();
     }
+    triangles_.insert(triangles_.end(), next_.begin(), next_.end());
+    next_.clear();
+    names_.erase(names_.begin(), names_.begin() + static_cast<std::ptrdiff_t>(layer.before));
     first_ = end_;
     end_ = layer.first + layer.vertices.size();
   }
@@ -122,46 +124,76 @@ class Checker {
   };
 
   /// Numbers of a layer's vertices after welding: the first of those in one place, in the newer layer if there are any.
-  static std::vector<std::uint32_t> name_vertices(const MeshLayer& layer) {
-    std::vector<std::uint32_t> id = first_equal(layer.vertices);
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> newer;
-    for (std::size_t i = layer.before; i < id.size(); ++i)
-      if (id[i] < layer.before) newer.emplace_back(id[i], static_cast<std::uint32_t>(i));
-    std::sort(newer.begin(), newer.end());
-    const auto first = static_cast<std::uint32_t>(layer.first);
-    if (newer.empty()) {
-      if (first > 0)
-        tbb::parallel_for(Range(0, id.size(), 4096), [&](const Range& range) {
-          for (std::size_t i = range.begin(); i < range.end(); ++i) id[i] += first;
-        });
-      return id;
+  /// What is open already gets them too.
+  std::vector<std::uint32_t> name_vertices(const MeshLayer& layer) {
+    std::vector<std::uint32_t> id = std::move(names_);
+    const std::vector<std::uint32_t> own = first_equal(layer.fresh());
+    id.resize(layer.vertices.size());
+    const auto fresh = static_cast<std::uint32_t>(layer.first + layer.before);
+    tbb::parallel_for(Range(0, own.size(), 4096), [&](const Range& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) id[layer.before + i] = fresh + own[i];
+    });
+    const auto newer = equal_across(layer, id);
+    if (newer.empty()) return id;
+    for (std::size_t i = 0; i < layer.before; ++i) {
+      const auto at = std::lower_bound(newer.begin(), newer.end(), std::pair{id[i], std::uint32_t{0}});
+      if (at != newer.end() && at->first == id[i]) id[i] = at->second;
     }
-    for (std::uint32_t& i : id) {
-      const auto at = std::lower_bound(newer.begin(), newer.end(), std::pair{i, std::uint32_t{0}});
-      i = first + (at != newer.end() && at->first == i ? at->second : i);
-    }
+    for (Triangle& t : triangles_)
+      for (std::uint32_t& v : t.corners)
+        if (v >= layer.first) v = id[v - layer.first];
     return id;
   }
 
-  /// A layer's triangles, but those with two equal corners, which have no place in the topology.
-  void append(const MeshLayer& layer, const std::vector<std::uint32_t>& id) {
-    const std::size_t old = triangles_.size();
-    triangles_.resize(old + layer.triangles.size());
-    std::atomic<std::int64_t> degenerate{0}, collapsed{0};
+  /// Numbers of vertices of the layer before with one in the same place in this layer, and its number; sorted. Only
+  /// where the boxes of both layers meet can there be any.
+  static std::vector<std::pair<std::uint32_t, std::uint32_t>> equal_across(const MeshLayer& layer,
+                                                                           const std::vector<std::uint32_t>& id) {
+    const std::array<std::span<const Vec3f>, 2> half{layer.vertices.first(layer.before), layer.fresh()};
+    std::array<Box3d, 2> box;
+    for (std::size_t side = 0; side < 2; ++side)
+      for (const Vec3f& v : half[side]) box[side].include(to_double(v));
+    std::vector<Vec3f> places;
+    std::vector<std::uint32_t> number;
+    std::size_t from_before = 0;
+    for (std::size_t side = 0; side < 2; ++side) {
+      const Box3d& other = box[1 - side];
+      for (std::size_t i = 0; !other.empty() && i < half[side].size(); ++i) {
+        if (!other.contains(to_double(half[side][i]))) continue;
+        places.push_back(half[side][i]);
+        number.push_back(id[side * layer.before + i]);
+      }
+      if (side == 0) from_before = places.size();
+    }
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> newer;
+    if (from_before == 0 || from_before == places.size()) return newer;
+    const std::vector<std::uint32_t> first = first_equal(places);
+    for (std::size_t i = from_before; i < first.size(); ++i)
+      if (first[i] < from_before) newer.emplace_back(number[first[i]], number[i]);
+    std::sort(newer.begin(), newer.end());
+    return newer;
+  }
+
+  /// A layer's triangles, but those with two equal corners, which have no place in the topology: to visit now, if a
+  /// vertex of the layer before is among their corners, or next.
+  void append(const MeshLayer& layer) {
+    std::atomic<std::int64_t> degenerate{0};
     tbb::parallel_for(Range(0, layer.triangles.size(), 4096), [&](const Range& range) {
-      std::int64_t flat = 0, none = 0;
+      std::int64_t flat = 0;
       for (std::size_t t = range.begin(); t < range.end(); ++t) {
         const auto& [a, b, c] = layer.triangles[t];
         flat += zero_area(layer.at(a), layer.at(b), layer.at(c)) ? 1 : 0;
-        Triangle& mine = triangles_[old + t];
-        mine = {{id[a - layer.first], id[b - layer.first], id[c - layer.first]}, no_shell};
-        none += is_collapsed(mine) ? 1 : 0;
       }
       degenerate += flat;
-      collapsed += none;
     });
     result_.degenerate_triangles += degenerate;
-    if (collapsed > 0) std::erase_if(triangles_, is_collapsed);
+    const std::size_t fresh = layer.first + layer.before;
+    next_.reserve(layer.triangles.size());
+    for (const auto& [a, b, c] : layer.triangles) {
+      const Triangle mine{{names_[a - layer.first], names_[b - layer.first], names_[c - layer.first]}, no_shell};
+      if (is_collapsed(mine)) continue;
+      (std::min({mine.corners[0], mine.corners[1], mine.corners[2]}) < fresh ? triangles_ : next_).push_back(mine);
+    }
   }
   static bool is_collapsed(const Triangle& t) {
     const auto& [a, b, c] = t.corners;
@@ -207,24 +239,41 @@ class Checker {
       triangles_[kept++].shell = shell;
     }
     for (std::uint32_t t = 0; t < number.size(); ++t)
-      result_.shells += shells_->root(t) == t && number[t] == no_shell ? 1 : 0;
+      result_.shells += number[t] == no_shell && shells_->is_root(t) ? 1 : 0;
     triangles_.resize(kept);
   }
 
-  // Lists the corners at each vertex to visit (a counting sort). Each thread goes through all triangles for its share
-  // of the vertices: that is less than what it costs to share the counters.
+  // Lists the corners at each vertex to visit (a counting sort). Each thread has its share of the vertices, and goes
+  // through the chunks of triangles that touch it: that is less than what it costs to share the counters.
   void collect_corners() {
     const std::size_t vertices = end_ - first_,
-                      shares = std::clamp<std::size_t>(
-                          static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()), 1, 8);
+                      shares = 4 * std::clamp<std::size_t>(
+                                       static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()), 1, 8);
+    constexpr std::size_t chunk_size = 2048;
+    const std::size_t chunks = (triangles_.size() + chunk_size - 1) / chunk_size;
+    const auto chunk_end = [&](std::size_t chunk) { return std::min(triangles_.size(), (chunk + 1) * chunk_size); };
+    std::vector<std::pair<std::size_t, std::size_t>> touched(chunks);  // least and greatest vertex
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+      std::uint32_t low = none, high = 0;
+      for (std::size_t t = chunk * chunk_size; t < chunk_end(chunk); ++t) {
+        for (const std::uint32_t v : triangles_[t].corners) {
+          low = std::min(low, v);
+          high = std::max(high, v);
+        }
+      }
+      touched[chunk] = {low, high};
+    });
     starts_.assign(vertices + 1, 0);
     const auto for_corners = [&](const auto& use) {
       tbb::parallel_for(std::size_t{0}, shares, [&](std::size_t share) {
         const std::size_t low = first_ + share * vertices / shares, high = first_ + (share + 1) * vertices / shares;
-        for (std::size_t t = 0; t < triangles_.size(); ++t) {
-          for (std::uint32_t i = 0; i < 3; ++i) {
-            const std::uint32_t v = triangles_[t].corners[i];
-            if (v - low < high - low) use(starts_[v - first_], 3 * static_cast<std::uint32_t>(t) + i);
+        for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+          if (touched[chunk].first >= high || touched[chunk].second < low) continue;
+          for (std::size_t t = chunk * chunk_size; t < chunk_end(chunk); ++t) {
+            for (std::uint32_t i = 0; i < 3; ++i) {
+              const std::uint32_t v = triangles_[t].corners[i];
+              if (v - low < high - low) use(starts_[v - first_], 3 * static_cast<std::uint32_t>(t) + i);
+            }
           }
         }
       });
@@ -305,11 +354,13 @@ class Checker {
     tally.nonmanifold_vertices += fans > 1 ? 1 : 0;
   }
 
-  static constexpr std::uint32_t no_shell = 0xffffffff;
+  static constexpr std::uint32_t none = 0xffffffff, no_shell = none;
   MeshCheck result_;
   Vec3d from_{};
   bool begun_ = false;
-  std::vector<Triangle> triangles_;
+  std::vector<std::uint32_t> names_;  // of the last layer's vertices
+  std::vector<Triangle> triangles_;   // with a vertex to visit
+  std::vector<Triangle> next_;        // without
   std::unique_ptr<Sets> shells_;
   std::uint32_t shell_count_ = 0;
   std::size_t first_ = 0, end_ = 0;  // vertices to visit

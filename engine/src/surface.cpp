@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <array>
@@ -17,6 +18,7 @@
 #include "fibrolite/file.h"
 #include "fibrolite/random.h"
 #include "keep_volume.h"
+#include "weld.h"
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -37,12 +39,6 @@ void each_chunk(std::size_t count, const Work& work) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
   });
-}
-
-/// Without area.
-bool flat(Vec3f a, Vec3f b, Vec3f c) {
-  const Vec3d n = cross(to_double(b) - to_double(a), to_double(c) - to_double(a));
-  return dot(n, n) <= 0;
 }
 
 /// What has been made of the layers, in memory or in a scratch file.
@@ -101,16 +97,22 @@ class LayerStore {
   std::size_t points_ = 0, quads_ = 0;
 };
 
+struct FinishedLayer {
+  std::vector<Vec3f> vertices;
+  std::size_t first = 0, before = 0;
+  std::vector<Mesh::Triangle> triangles;
+};
+
 /// The layers' last step, one after another: moved, split. A layer is done when the next one has been looked at, which
 /// may shake its vertices.
 class Finisher {
  public:
-  using Use = std::function<void(const MeshLayer&)>;
-  Finisher(double step, double voxel_mm, const Use& use)
+  using Use = std::function<void(FinishedLayer&)>;  ///< Which may swap it for another, to be written over.
+  Finisher(double step, double voxel_mm, Use use)
       : step_(static_cast<float>(step) * move_unit(voxel_mm)),
         whole_step_(move_unit(voxel_mm)),
         voxel_mm_(voxel_mm),
-        use_(use) {}
+        use_(std::move(use)) {}
 
   void add(const MovableLayer& layer) {
     const std::size_t from = points_.size();
@@ -141,7 +143,7 @@ class Finisher {
  private:
   [[nodiscard]] Vec3f at(std::uint32_t v) const { return points_[v - first_]; }
   [[nodiscard]] bool flat(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-    return fibrolite::flat(at(a), at(b), at(c));
+    return zero_area(at(a), at(b), at(c));
   }
   [[nodiscard]] bool degenerate(const Quad& q) const {
     return (flat(q[0], q[1], q[2]) || flat(q[0], q[2], q[3])) && (flat(q[0], q[1], q[3]) || flat(q[1], q[2], q[3]));
@@ -175,7 +177,7 @@ class Finisher {
   /// triangle without area.
   void hand_on() {
     if (before_ + upper_ == 0) return;
-    triangles_.resize(2 * quads_.size());
+    done_.triangles.resize(2 * quads_.size());
     const std::vector<Vec3f>& points = whole_.empty() ? points_ : whole_;
     const auto squared_distance = [&](std::uint32_t a, std::uint32_t b) {
       const Vec3d d = to_double(points[a - first_]) - to_double(points[b - first_]);
@@ -187,10 +189,13 @@ class Finisher {
       const auto without_area = [&](std::size_t a, std::size_t b, std::size_t c) { return flat(q[a], q[b], q[c]); };
       if (first ? without_area(0, 1, 2) || without_area(0, 2, 3) : without_area(0, 1, 3) || without_area(1, 2, 3))
         first = !first;
-      triangles_[2 * i] = {q[0], q[1], first ? q[2] : q[3]};
-      triangles_[2 * i + 1] = {first ? q[0] : q[1], q[2], q[3]};
+      done_.triangles[2 * i] = {q[0], q[1], first ? q[2] : q[3]};
+      done_.triangles[2 * i + 1] = {first ? q[0] : q[1], q[2], q[3]};
     });
-    use_({std::span(points_).first(before_ + upper_), first_, before_, triangles_, {}});
+    done_.vertices.assign(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_ + upper_));
+    done_.first = first_;
+    done_.before = before_;
+    use_(done_);
     const auto below = static_cast<std::ptrdiff_t>(before_);
     points_.erase(points_.begin(), points_.begin() + below);
     if (!whole_.empty()) whole_.erase(whole_.begin(), whole_.begin() + below);
@@ -199,13 +204,13 @@ class Finisher {
 
   float step_, whole_step_;  // mm for each unit of a move
   double voxel_mm_;
-  const Use& use_;
+  const Use use_;
   // Of the layer below the one that waits, that one, and for a moment the next.
   std::vector<Vec3f> points_;
   std::vector<Vec3f> whole_;  // the same after a whole move, if that is another step
   std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
   std::vector<Quad> quads_;  // of the one that waits
-  std::vector<Mesh::Triangle> triangles_;
+  FinishedLayer done_;
 };
 
 }  // namespace
@@ -238,12 +243,19 @@ void SurfaceLayers::add(const Solid& solid, const SampleRange& range, const Cont
   if (range.axis != impl_->params.axis) throw Error(Code::Internal, "slabs lie across another axis than the layers");
   context.check();
   return_free_memory();
+  // The next layer is made while this one's vertices find their places.
+  QuadLayer held;
+  tbb::task_group behind;
   impl_->dual.add(
       solid, range,
       [&](QuadLayer&& layer) {
-        impl_->keep.add(std::move(layer), [&](MovableLayer&& done) { impl_->push(std::move(done)); });
+        behind.wait();
+        held = std::move(layer);
+        behind.run(
+            [&] { impl_->keep.add(std::move(held), [&](MovableLayer&& done) { impl_->push(std::move(done)); }); });
       },
       context);
+  behind.wait();
 }
 
 void SurfaceLayers::finish(double volume_mm3) {
@@ -257,7 +269,14 @@ std::size_t SurfaceLayers::triangles() const { return 2 * impl_->store.quads(); 
 
 void SurfaceLayers::each(const std::function<void(const MeshLayer&)>& use, const Context& context) const {
   if (!impl_->finished) throw Error(Code::Internal, "the surface is not finished");
-  Finisher finisher(impl_->step, impl_->grid.voxel_mm, use);
+  // The next layer is made while this one is used.
+  FinishedLayer held;
+  tbb::task_group behind;
+  Finisher finisher(impl_->step, impl_->grid.voxel_mm, [&](FinishedLayer& layer) {
+    behind.wait();
+    std::swap(held, layer);
+    behind.run([&] { use({held.vertices, held.first, held.before, held.triangles, {}}); });
+  });
   MovableLayer room;
   const std::size_t count = impl_->store.size();
   for (std::size_t n = 0; n < count; ++n) {
@@ -266,6 +285,7 @@ void SurfaceLayers::each(const std::function<void(const MeshLayer&)>& use, const
     context.progress(static_cast<double>(n + 1) / static_cast<double>(count));
   }
   finisher.finish();
+  behind.wait();
 }
 
 Mesh surface(const Solid& solid, const SurfaceParams& params, const Context& context) {

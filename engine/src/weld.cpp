@@ -124,6 +124,14 @@ Mesh welded(const Mesh& mesh) {
 }
 
 bool zero_area(Vec3f fa, Vec3f fb, Vec3f fc) {
+  // Nearly always rounding leaves no doubt: each product is right to 2e-7 of itself.
+  const Vec3f fu{fb.x - fa.x, fb.y - fa.y, fb.z - fa.z}, fv{fc.x - fa.x, fc.y - fa.y, fc.z - fa.z};
+  const auto clearly_differ = [](float pq, float rs) {
+    return std::abs(pq - rs) > 1e-6F * (std::abs(pq) + std::abs(rs)) + 1e-30F;
+  };
+  if (clearly_differ(fu.y * fv.z, fu.z * fv.y) || clearly_differ(fu.z * fv.x, fu.x * fv.z) ||
+      clearly_differ(fu.x * fv.y, fu.y * fv.x))
+    return false;
   const Vec3d a = to_double(fa), u = to_double(fb) - a, v = to_double(fc) - a;
   const auto equal_products = [](double p, double q, double r, double s) {
     const double pq = p * q, rs = r * s;
