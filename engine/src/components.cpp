@@ -246,6 +246,15 @@ Vec3d world_mm(const openvdb::Coord& c, double voxel_mm) {
   return voxel_mm * Vec3d{1.0 * c.x(), 1.0 * c.y(), 1.0 * c.z()};
 }
 
+bool any_inside(const Shape& shape, const std::vector<openvdb::Coord>& samples, double voxel_mm) {
+  std::vector<Vec3d> points;
+  points.reserve(samples.size());
+  for (const openvdb::Coord& at : samples) points.push_back(world_mm(at, voxel_mm));
+  std::vector<float> value(points.size());
+  shape.evaluate(points, value);
+  return std::any_of(value.begin(), value.end(), [](float v) { return v < 0; });
+}
+
 Pieces summarize(const std::vector<Components::Component>& list, double voxel_mm) {
   Pieces result;
   for (std::size_t i = 1; i < list.size(); ++i) {  // 0 is the exterior

@@ -11,6 +11,7 @@
 
 #include "fibrolite/context.h"
 #include "fibrolite/pieces.h"
+#include "fibrolite/shape.h"
 #include "fibrolite/solid.h"
 #include "vdb_access.h"
 
@@ -91,6 +92,8 @@ class Components {
 };
 
 [[nodiscard]] Vec3d world_mm(const openvdb::Coord& c, double voxel_mm);
+/// Is a shape negative at any of them?
+[[nodiscard]] bool any_inside(const Shape& shape, const std::vector<openvdb::Coord>& samples, double voxel_mm);
 /// Material and cavities; the first of the list is the exterior and in neither.
 [[nodiscard]] Pieces summarize(const std::vector<Components::Component>& list, double voxel_mm);
 

@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "components.h"
+#include "depth.h"
+#include "nearest_way.h"
 
 namespace fibrolite {
 namespace {
@@ -110,9 +112,11 @@ struct PieceSweep::Impl {
   [[nodiscard]] Components components_of(const Solid& solid, const SampleRange& range, const Context& context) const {
     return {solid, context, -static_cast<float>(params.skin_mm), &range};
   }
-  void add(const Components& components, const SampleRange& range, const Shape& anchor) {
+  /// `solid`: if there is a skin.
+  void add(const Components& components, const SampleRange& range, const Shape& anchor, const Solid* solid,
+           const Context& context) {
     std::map<std::pair<int, int>, Face> next;
-    if (!components.empty()) take(components, range, anchor, next);
+    if (!components.empty()) take(components, range, anchor, solid, next, context);
     // What the slab before left open, against this one's first layer or the exterior.
     for (const auto& [place, face] : faces) join_faces(face, outside_if_absent(first_layer, place));
     for (const auto& [place, face] : first_layer)
@@ -125,8 +129,8 @@ struct PieceSweep::Impl {
     return found != layer.end() ? found->second : outside();
   }
 
-  void take(const Components& components, const SampleRange& range, const Shape& anchor,
-            std::map<std::pair<int, int>, Face>& next) {
+  void take(const Components& components, const SampleRange& range, const Shape& anchor, const Solid* solid,
+            std::map<std::pair<int, int>, Face>& next, const Context& context) {
     // The slab's components get numbers of their own.
     const auto list = components.list();
     std::map<Id, Id> number{{list.front().id, exterior}};
@@ -156,6 +160,55 @@ struct PieceSweep::Impl {
       if (origin[axis] == last) next.emplace(across(origin), face(labels, id, !params.falling));
       hold(origin, labels, id, anchor);
     });
+    if (solid != nullptr) regrow(components, list, number, *solid, range, anchor, context);
+  }
+
+  /// Values of a union understate depth, so that a skin cuts off more than it should: what is not held is grown by the
+  /// samples around it that are deep all the same, until it meets what is.
+  void regrow(const Components& components, const std::vector<Components::Component>& list,
+              const std::map<Id, Id>& number, const Solid& solid, const SampleRange& range, const Shape& anchor,
+              const Context& context) {
+    constexpr std::int64_t most = 1 << 20;  // larger ones are met by those around them
+    struct Open {
+      Id set;
+      Coord from;
+      std::vector<Id> met{};
+      bool anchored = false;
+    };
+    std::vector<Open> all;
+    for (const Components::Component& one : list) {
+      const Id id = number.at(one.id);
+      if (one.inside && !sets[id].held && one.voxels <= most) all.push_back({id, one.first});
+    }
+    tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+      if (context.cancelled()) return;
+      Open& mine = all[i];
+      Depth depth(solid, params.skin_mm, &range);
+      openvdb::MaskTree seen;
+      seen.setValueOn(mine.from);
+      std::vector<Coord> samples{mine.from};
+      for (std::size_t done = 0; done < samples.size(); ++done) {
+        for (const auto& s : face_steps) {
+          const Coord to = samples[done].offsetBy(s[0], s[1], s[2]);
+          if (!range.holds({to.x(), to.y(), to.z()}) || seen.isValueOn(to)) continue;
+          seen.setValueOn(to);
+          if (!depth.deep(to)) continue;
+          const Id other = number.at(components.at(to));
+          if (other == mine.set || !sets[other].inside) {
+            samples.push_back(to);
+            continue;
+          }
+          if (mine.met.empty() || mine.met.back() != other) mine.met.push_back(other);
+          if (sets[other].held) return;
+        }
+      }
+      mine.anchored = any_inside(anchor, samples, grid.voxel_mm);
+    });
+    context.check();
+    for (const Open& one : all) {
+      if (one.anchored) sets[root(one.set)].held = true;
+      for (const Id other : one.met) join(one.set, other);
+    }
   }
 
   [[nodiscard]] Face face(const LeafLabels* labels, const std::vector<Id>& id, bool upper) const {
@@ -292,7 +345,8 @@ PieceSweep::PieceSweep(Grid grid, const Params& params) : impl_(std::make_shared
 
 void PieceSweep::add(const Solid& solid, int low, int high, const Shape& anchor, const Context& context) {
   const SampleRange range{impl_->params.axis, low, high};
-  impl_->add(impl_->components_of(solid, range, context), range, anchor);
+  impl_->add(impl_->components_of(solid, range, context), range, anchor, impl_->params.skin_mm > 0 ? &solid : nullptr,
+             context);
 }
 
 void PieceSweep::add(const Solid& solid, const std::vector<SampleRange>& ranges, const Context& context) {
@@ -305,7 +359,7 @@ void PieceSweep::add(const Solid& solid, const std::vector<SampleRange>& ranges,
       found[i].emplace(impl_->components_of(solid, ranges[from + i], context.part(0, 0, "")));
     });
     for (std::size_t i = 0; i < found.size(); ++i) {
-      impl_->add(*found[i], ranges[from + i], nothing());
+      impl_->add(*found[i], ranges[from + i], nothing(), nullptr, context);
       found[i].reset();
     }
   }

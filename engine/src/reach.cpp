@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "components.h"
+#include "depth.h"
 #include "fibrolite/disjoint_sets.h"
 #include "nearest_way.h"
 
@@ -63,54 +64,6 @@ Anchored find_anchored(const Components& components, const std::vector<Component
   return found;
 }
 
-/// Whether samples are as deep as asked for, by their values or, where those may understate it, by the distance to
-/// where the lattice's edges cross the surface.
-class Depth {
- public:
-  Depth(const Solid& solid, double depth_mm)
-      : access_(solid.impl().grid->tree()),
-        depth_mm_(static_cast<float>(depth_mm)),
-        depth_vox_(depth_mm / solid.grid().voxel_mm),
-        reach_(static_cast<int>(std::ceil(depth_vox_))) {}
-
-  [[nodiscard]] bool inside(const Coord& at) { return access_.getValue(at) < 0; }
-  [[nodiscard]] bool deep(const Coord& at) {
-    const float value = access_.getValue(at);
-    if (value < -depth_mm_ || value >= 0) return value < 0;
-    for (int x = -reach_ - 1; x <= reach_; ++x) {
-      for (int y = -reach_ - 1; y <= reach_; ++y) {
-        for (int z = -reach_ - 1; z <= reach_; ++z)
-          if (crossed(at, {x, y, z})) return false;
-      }
-    }
-    return true;
-  }
-
- private:
-  /// Does one of the three edges that start at a sample cross the surface within the depth?
-  [[nodiscard]] bool crossed(const Coord& at, const std::array<int, 3>& from) {
-    const float a = access_.getValue(at.offsetBy(from[0], from[1], from[2]));
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      std::array<int, 3> to = from;
-      ++to[axis];
-      const float b = access_.getValue(at.offsetBy(to[0], to[1], to[2]));
-      if ((a < 0) == (b < 0)) continue;
-      double square = 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double d = from[k] + (k == axis ? static_cast<double>(a) / (a - b) : 0);
-        square += d * d;
-      }
-      if (square < depth_vox_ * depth_vox_) return true;
-    }
-    return false;
-  }
-
-  openvdb::FloatGrid::ConstUnsafeAccessor access_;
-  float depth_mm_;
-  double depth_vox_;
-  int reach_;
-};
-
 /// Components that the values leave unreached, each grown by the samples around it that are deep all the same. Those
 /// that meet are one; those that meet what is reached, or the anchor, are reached. Set 0 is what is reached.
 class Regrown {
@@ -126,16 +79,8 @@ class Regrown {
       context.check();
       flood(unreached[i], static_cast<std::uint32_t>(i + 1));
     }
-    std::vector<Vec3d> points;
-    std::vector<float> value;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      points.clear();
-      for (const Coord& at : samples_[i]) points.push_back(world_mm(at, voxel_mm));
-      value.resize(points.size());
-      anchor.evaluate(points, value);
-      if (std::any_of(value.begin(), value.end(), [](float v) { return v < 0; }))
-        sets_.join(0, static_cast<std::uint32_t>(i + 1));
-    }
+    for (std::size_t i = 0; i < samples_.size(); ++i)
+      if (any_inside(anchor, samples_[i], voxel_mm)) sets_.join(0, static_cast<std::uint32_t>(i + 1));
   }
 
   [[nodiscard]] std::uint32_t set_of(std::size_t i) { return sets_.root(static_cast<std::uint32_t>(i + 1)); }

@@ -150,6 +150,22 @@ TEST(PieceSweep, tells_what_hangs_on_nothing) {
   });
 }
 
+/// As reach_test's: a bar of two halves, whose values say nothing of its depth. Well within a slab it is measured.
+TEST(PieceSweep, what_values_of_a_union_understate_is_held) {
+  const Shape wall = cuboid({{-10, -4, -4}, {-6, 4, 4}}), block = cuboid({{4, -2, -2}, {8, 2, 2}});
+  const auto loose = [&](double half, int axis) {
+    const Shape bar = unite({cuboid({{-7, 0.1 - half, 0.1 - half}, {5, 0.1, 0.1 + half}}),
+                             cuboid({{-7, 0.1, 0.1 - half}, {5, 0.1 + half, 0.1 + half}})});
+    const PieceSweep::Result got =
+        swept(make(unite({wall, block, bar})), axis, high - low, {.skin_mm = skin_mm(1.2, grid)}, wall);
+    return std::count(got.held.begin(), got.held.end(), false);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_EQ(loose(0.6, axis), 0);
+    EXPECT_EQ(loose(0.3, axis), 1);
+  }
+}
+
 TEST(PieceSweep, boxes_hold_their_pieces) {
   const Solid solid = make(unite({sphere({-5, 1, 2}, 3), sphere({6, 0, 0}, 2)}));
   for_cuts([&](int axis, int thickness) {
