@@ -290,7 +290,7 @@ struct SolidStream::Impl {
     report_solid(made.tied, design.fills, sums.body_vox * h * h * h, sums.solid_vox * h * h * h, design.recipe.material,
                  report);
     if (const PrintParams& limits = design.recipe.print; limits.check) {
-      Scan all = sums.faults;
+      Scan all = std::move(sums.faults);
       drop_noise(all, limits, h);
       report.print.found = summed(all, design.recipe.verify.up, node_mm(design.fills, limits));
       report.print.checked = true;
