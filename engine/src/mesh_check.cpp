@@ -147,12 +147,12 @@ class Checker {
 
   /// Numbers of vertices of the layer before with one in the same place in this layer, and its number; sorted. Only
   /// where the boxes of both layers meet can there be any.
-  static std::vector<std::pair<std::uint32_t, std::uint32_t>> equal_across(const MeshLayer& layer,
-                                                                           const std::vector<std::uint32_t>& id) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> equal_across(const MeshLayer& layer,
+                                                                    const std::vector<std::uint32_t>& id) {
     const std::array<std::span<const Vec3f>, 2> half{layer.vertices.first(layer.before), layer.fresh()};
-    std::array<Box3d, 2> box;
-    for (std::size_t side = 0; side < 2; ++side)
-      for (const Vec3f& v : half[side]) box[side].include(to_double(v));
+    std::array<Box3d, 2> box{box_, {}};
+    for (const Vec3f& v : half[1]) box[1].include(to_double(v));
+    box_ = box[1];
     std::vector<Vec3f> places;
     std::vector<std::uint32_t> number;
     std::size_t from_before = 0;
@@ -359,6 +359,7 @@ class Checker {
   Vec3d from_{};
   bool begun_ = false;
   std::vector<std::uint32_t> names_;  // of the last layer's vertices
+  Box3d box_;                         // around them
   std::vector<Triangle> triangles_;   // with a vertex to visit
   std::vector<Triangle> next_;        // without
   std::unique_ptr<Sets> shells_;

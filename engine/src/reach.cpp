@@ -129,10 +129,6 @@ class Regrown {
   openvdb::Int32Tree owner_{0};
 };
 
-}  // namespace
-
-namespace {
-
 /// Samples within half a cube's diagonal of a line make a chain of neighbours along it: those whose cubes it passes.
 constexpr double half_diagonal = 0.8661;
 constexpr double told_beyond = 0.5;  ///< Voxels that values must be told deeper than the skin.

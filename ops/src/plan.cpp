@@ -18,6 +18,7 @@ double choose_voxel(const Box3d& model, const Recipe& recipe, InfillKind infill,
   if (wanted) return *wanted;
   const double thinnest = thinnest_mm(recipe, infill), held = coarsest_voxel(thinnest, recipe.print.wall_mm);
   const double voxel = std::min(model.longest_side() / 400, thinnest / 3);
+  // Of members hardly thicker than a wall no voxel tells that: finer ones would be paid for nothing.
   return held < thinnest / 4 ? voxel : std::min(voxel, held);
 }
 

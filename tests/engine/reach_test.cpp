@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "fibrolite/frame.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
 
@@ -37,22 +38,31 @@ TEST(Unreached, finds_what_hangs_on_a_thin_neck) {
   EXPECT_EQ(unreached(make(unite({anchor, block})), everything(), {.neck_mm = 0.8}).size(), 0U);
 }
 
-/// However a bar lies on the lattice, one as thick as asked for holds and one two voxels thinner does not. The worst
-/// are those along the diagonal of a face, through samples and half a voxel above them.
+/// However a bar or a plate lies on the lattice, one as thick as asked for holds and one 1.75 voxels thinner does not:
+/// 2.4, 4.8 and 12 voxels thick, of which the last is thicker than twice the band. The worst are those along the
+/// diagonal of a face, through samples and half a voxel above them.
 TEST(Unreached, a_neck_is_judged_the_same_in_all_directions) {
   Random random(1, "necks");
-  for (int n = 0; n < 16; ++n) {
+  for (int n = 0; n < 36; ++n) {
     const auto unit = [&] { return 2 * random.uniform() - 1; };
-    const Vec3d along = n == 0 ? Vec3d{1, 1, 0} : n == 1 ? Vec3d{1, 1, 1} : Vec3d{unit(), unit(), unit()};
-    const Vec3d middle = n == 0 ? Vec3d{0, 0, 0.125} : n == 1 ? Vec3d{} : 0.125 * Vec3d{unit(), unit(), unit()};
+    const Vec3d along = n < 3 ? Vec3d{1, 1, 0} : n < 6 ? Vec3d{1, 1, 1} : Vec3d{unit(), unit(), unit()};
+    const Vec3d middle = n < 3 ? Vec3d{0, 0, 0.125} : n < 6 ? Vec3d{} : 0.125 * Vec3d{unit(), unit(), unit()};
     const Vec3d end = 6 / norm(along) * along;
     const Shape anchor = sphere(middle - end, 3), far = sphere(middle + end, 2);
-    const auto found = [&](double radius) {
-      const Shape bar = cylinder(middle - end, middle + end, radius);
-      return unreached(make(unite({anchor, far, bar})), anchor, {.neck_mm = 1.2}).size();
+    const double neck = n % 3 == 0 ? 0.6 : n % 3 == 1 ? 1.2 : 3;
+    const Grid told = telling(neck, grid);
+    EXPECT_EQ(told.inside_vox > told.band_vox, neck == 3);
+    const Frame frame = frame_along(middle, normalized(along));
+    const auto found = [&](double thick, bool plate) {
+      const Shape bar = plate ? placed(cuboid({{-2, -0.5 * thick, -6}, {2, 0.5 * thick, 6}}), frame)
+                              : cylinder(middle - end, middle + end, 0.5 * thick);
+      const Solid solid = realize(unite({anchor, far, bar}), Box3d{{-12, -12, -12}, {12, 12, 12}}, told);
+      return unreached(solid, anchor, {.neck_mm = neck}).size();
     };
-    EXPECT_EQ(found(0.6), 0U) << "bar " << n;
-    EXPECT_EQ(found(0.35), 1U) << "bar " << n;
+    for (const bool plate : {false, true}) {
+      EXPECT_EQ(found(neck, plate), 0U) << n << (plate ? " plate" : " bar");
+      EXPECT_GE(found(neck - 1.75 * grid.voxel_mm, plate), 1U) << n << (plate ? " plate" : " bar");
+    }
   }
 }
 

@@ -30,7 +30,8 @@ class MeshLayers {
   [[nodiscard]] virtual std::size_t triangles() const = 0;
   /// Have its layers colours?
   [[nodiscard]] virtual bool colored() const { return false; }
-  /// In order, as often as asked for; the same each time. A layer lives until `use` returns. Reports progress.
+  /// In order, as often as asked for; the same each time. A layer lives until `use` returns, which may be called on
+  /// another thread, but never twice at once: the next layer is made meanwhile. Reports progress.
   /// @throws Error Cancelled, Io; whatever `use` throws.
   virtual void each(const std::function<void(const MeshLayer&)>& use, const Context& context) const = 0;
 };
