@@ -21,10 +21,18 @@ void each(Sums& sums, const Field& field, const List& list) {
   field(sums.body_vox);
   field(sums.solid_vox);
   field(sums.active_voxels);
-  list(sums.faults.walls);
-  list(sums.faults.gaps);
-  list(sums.faults.steep);
-  field(sums.faults.lumen_mm2);
+  field(sums.print.lumen_mm2);
+  auto count = static_cast<std::uint64_t>(sums.print.runs.size());
+  field(count);
+  if constexpr (!std::is_const_v<Sums>) sums.print.runs.resize(count);
+  for (auto& run : sums.print.runs) {
+    field(run.range);
+    for (auto& kind : run.kinds) {
+      field(kind.closed);
+      list(kind.open);
+      list(kind.border);
+    }
+  }
 }
 template <class Tie, class Flip, class Field, class List>
 void each(Tie& tied, Flip& flips, const Field& field, const List& list) {
@@ -45,14 +53,13 @@ void each(Tie& tied, Flip& flips, const Field& field, const List& list) {
 
 }  // namespace
 
-SlabSums& SlabSums::operator+=(const SlabSums& other) {
+void SlabSums::add(const SlabSums& other, const PatchRules& rules) {
   parts.resize(other.parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) parts[i] += other.parts[i];
   body_vox += other.body_vox;
   solid_vox += other.solid_vox;
   active_voxels += other.active_voxels;
-  add(faults, other.faults);
-  return *this;
+  print.add(other.print, rules);
 }
 
 void keep(KeptWork& work, const SampleRange& slab, const SlabSums& sums) {

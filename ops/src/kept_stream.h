@@ -9,7 +9,7 @@
 #include "fibrolite/ops/measure.h"
 #include "fibrolite/ops/tie.h"
 #include "fibrolite/piece_sweep.h"
-#include "print_scan.h"
+#include "print_patches.h"
 
 namespace fibrolite {
 
@@ -18,8 +18,8 @@ struct SlabSums {
   std::vector<PartSums> parts;
   double body_vox = 0, solid_vox = 0;
   std::int64_t active_voxels = 0;
-  Scan faults;  ///< Noise and all.
-  SlabSums& operator+=(const SlabSums& other);
+  PrintTally print;
+  void add(const SlabSums& other, const PatchRules& rules);
 };
 
 void keep(KeptWork& work, const SampleRange& slab, const SlabSums& sums);

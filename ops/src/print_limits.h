@@ -3,6 +3,7 @@
 #pragma once
 
 #include "fibrolite/ops/printable.h"
+#include "print_patches.h"
 #include "print_scan.h"
 
 namespace fibrolite {
@@ -12,10 +13,9 @@ namespace fibrolite {
 /// which prints as a fillet. @throws Error BadRecipe: a range of PrintParams.
 [[nodiscard]] Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up,
                               const Context& context);
-/// The same in steps, for solids that come in ranges: what a range has, then what counts of all, then the sum.
-[[nodiscard]] Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up,
-                              const SampleRange& range, const Context& context);
-void drop_noise(Scan& found, const PrintParams& params, double voxel_mm);
-[[nodiscard]] Printable summed(const Scan& found, Vec3d up, double node_mm);
+/// The same for solids that come in ranges, which a tally joins.
+[[nodiscard]] PatchRules patch_rules(const PrintParams& params, Vec3d up, double node_mm, double voxel_mm);
+[[nodiscard]] PrintTally print_tally(const Solid& solid, const Shape& lumen, const PrintParams& params,
+                                     const PatchRules& rules, const SampleRange& range, const Context& context);
 
 }  // namespace fibrolite

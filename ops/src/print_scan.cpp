@@ -7,13 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <numbers>
 #include <tuple>
 
 #include "fibrolite/blocks.h"
-#include "fibrolite/disjoint_sets.h"
-#include "fibrolite/frame.h"
 
 namespace fibrolite {
 namespace {
@@ -163,37 +159,6 @@ Scan scan_tile(const Solid& solid, const Shape& lumen, const ScanLimits& limits,
   return found;
 }
 
-using Key = std::uint64_t;
-constexpr Key key(int x, int y, int z) {  // neighbours differ by a constant
-  constexpr int middle = 1 << 20;
-  return (static_cast<Key>(x + middle) << 42) + (static_cast<Key>(y + middle) << 21) + static_cast<Key>(z + middle);
-}
-
-/// For each spot the number of its patch, by joining samples that touch.
-std::vector<std::size_t> patch_numbers(const std::vector<Spot>& spots) {
-  std::vector<Key> keys;
-  for (const Spot& s : spots) keys.push_back(key(s.at.x, s.at.y, s.at.z));
-  std::vector<Key> sorted = keys;
-  std::sort(sorted.begin(), sorted.end());
-  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-  DisjointSets sets(sorted.size());
-  for (int n = 14; n < 27; ++n) {  // the 13 neighbours that come later
-    const Key step = key(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1) - key(0, 0, 0);
-    std::size_t j = 0;
-    for (std::size_t i = 0; i < sorted.size(); ++i) {
-      while (j < sorted.size() && sorted[j] < sorted[i] + step) ++j;
-      if (j == sorted.size()) break;
-      if (sorted[j] != sorted[i] + step) continue;
-      sets.join(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j));
-    }
-  }
-  std::vector<std::size_t> number;
-  for (const Key k : keys)
-    number.push_back(
-        sets.root(static_cast<std::uint32_t>(std::lower_bound(sorted.begin(), sorted.end(), k) - sorted.begin())));
-  return number;
-}
-
 }  // namespace
 
 Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, const Context& context,
@@ -213,84 +178,13 @@ Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, cons
   });
   context.check();
   Scan all;
-  for (const Scan& part : parts) add(all, part);
+  for (const Scan& part : parts) {
+    all.walls.insert(all.walls.end(), part.walls.begin(), part.walls.end());
+    all.gaps.insert(all.gaps.end(), part.gaps.begin(), part.gaps.end());
+    all.steep.insert(all.steep.end(), part.steep.begin(), part.steep.end());
+    all.lumen_mm2 += part.lumen_mm2;
+  }
   return all;
-}
-
-void add(Scan& to, const Scan& from) {
-  to.walls.insert(to.walls.end(), from.walls.begin(), from.walls.end());
-  to.gaps.insert(to.gaps.end(), from.gaps.begin(), from.gaps.end());
-  to.steep.insert(to.steep.end(), from.steep.begin(), from.steep.end());
-  to.lumen_mm2 += from.lumen_mm2;
-}
-
-void sort_spots(std::vector<Spot>& spots) {
-  const auto key = [](const Spot& s) {
-    return std::tuple(s.at.x, s.at.y, s.at.z, s.foot_mm.x, s.foot_mm.y, s.foot_mm.z);
-  };
-  std::stable_sort(spots.begin(), spots.end(), [&](const Spot& a, const Spot& b) { return key(a) < key(b); });
-}
-
-void drop_small_patches(std::vector<Spot>& spots, double least_mm2) {
-  const std::vector<std::size_t> number = patch_numbers(spots);
-  std::vector<double> area(spots.size(), 0.0);
-  for (std::size_t i = 0; i < spots.size(); ++i) area[number[i]] += spots[i].area_mm2;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < spots.size(); ++i) {
-    if (area[number[i]] >= least_mm2) spots[kept++] = spots[i];
-  }
-  spots.resize(kept);
-}
-
-std::vector<Patch> patches(const std::vector<Spot>& spots, Vec3d up) {
-  constexpr int directions = 8;
-  const Frame frame = frame_along({}, up);
-  std::array<Vec3d, directions> across;
-  for (int d = 0; d < directions; ++d) {
-    const double angle = std::numbers::pi * d / directions;
-    across[static_cast<std::size_t>(d)] = std::cos(angle) * frame.x + std::sin(angle) * frame.y;
-  }
-  struct Sum {
-    Patch patch;
-    Vec3d moment{};
-    std::array<double, directions> low, high;
-  };
-  const std::vector<std::size_t> number = patch_numbers(spots);
-  std::vector<std::size_t> slot(spots.size(), spots.size());
-  std::vector<Sum> sums;
-  for (std::size_t i = 0; i < spots.size(); ++i) {
-    const Spot& spot = spots[i];
-    if (slot[number[i]] == spots.size()) {
-      slot[number[i]] = sums.size();
-      Sum& fresh = sums.emplace_back();
-      fresh.patch.least_mm = INFINITY;
-      fresh.low.fill(INFINITY);
-      fresh.high.fill(-INFINITY);
-    }
-    Sum& sum = sums[slot[number[i]]];
-    sum.patch.area_mm2 += spot.area_mm2;
-    sum.patch.volume_mm3 += 0.5 * spot.area_mm2 * spot.mm;
-    sum.moment = sum.moment + spot.area_mm2 * spot.foot_mm;
-    if (spot.mm < sum.patch.least_mm) {
-      sum.patch.least_mm = spot.mm;
-      sum.patch.at_mm = spot.foot_mm;
-    }
-    for (std::size_t d = 0; d < directions; ++d) {
-      const double at = dot(across[d], spot.foot_mm);
-      sum.low[d] = std::min(sum.low[d], at);
-      sum.high[d] = std::max(sum.high[d], at);
-    }
-  }
-  std::vector<Patch> result;
-  for (Sum& sum : sums) {
-    for (std::size_t d = 0; d < directions; ++d)
-      sum.patch.across_mm = std::max(sum.patch.across_mm, sum.high[d] - sum.low[d]);
-    if (sum.patch.least_mm == 0) sum.patch.at_mm = sum.moment / sum.patch.area_mm2;
-    result.push_back(sum.patch);
-  }
-  std::stable_sort(result.begin(), result.end(),
-                   [](const Patch& a, const Patch& b) { return a.area_mm2 > b.area_mm2; });
-  return result;
 }
 
 }  // namespace fibrolite

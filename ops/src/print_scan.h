@@ -28,7 +28,7 @@ struct ScanLimits {
 };
 struct Scan {
   std::vector<Spot> walls, gaps, steep;
-  double lumen_mm2 = 0;  ///< Surface in the lumen.
+  double lumen_mm2 = 0;  ///< Surface in the lumen; exact in any order of summing.
 };
 /// Thickness is measured along the normal, from the zero set alone, since magnitudes of composed values are not
 /// distances. `lumen` is negative where gaps and steep faces matter. Areas are right for planes at any angle. Cost:
@@ -37,22 +37,5 @@ struct Scan {
 /// `range`: only edges of the lattice that start there; the solid must be known as far beyond it as the limits reach.
 [[nodiscard]] Scan scan(const Solid& solid, const Shape& lumen, const ScanLimits& limits, const Context& context,
                         const SampleRange* range = nullptr);
-/// Of several ranges: spots of all, and their areas summed without an error.
-void add(Scan& to, const Scan& from);
-/// By place: the order no longer tells in what ranges they were found.
-void sort_spots(std::vector<Spot>& spots);
-
-/// Spots that hang together (26 neighbours).
-struct Patch {
-  double area_mm2 = 0;
-  double volume_mm3 = 0;  ///< Of the walls or gaps behind it: half of what both their faces span.
-  double least_mm = 0;    ///< Least Spot::mm.
-  double across_mm = 0;   ///< Its largest extent in any direction across `up`.
-  Vec3d at_mm{};          ///< Where it is least; of a steep patch, its middle.
-};
-/// Largest area first; ties in scan order. Cost: O(spots log spots).
-[[nodiscard]] std::vector<Patch> patches(const std::vector<Spot>& spots, Vec3d up);
-/// Drops the spots of patches with less area than this.
-void drop_small_patches(std::vector<Spot>& spots, double least_mm2);
 
 }  // namespace fibrolite

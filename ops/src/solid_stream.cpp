@@ -36,6 +36,8 @@ struct SolidStream::Impl {
                context) {
     for (const Part& part : design.parts.parts) regions.push_back(part.region());
     sticks = sticks_of(design.parts, design.fills);
+    const PrintParams& limits = design.recipe.print;
+    print_rules = patch_rules(limits, design.recipe.verify.up, node_mm(design.fills, limits), grid.voxel_mm);
     sums.parts.resize(regions.size());
     measured.resize(plan.borders.size() - 1, false);
   }
@@ -248,7 +250,7 @@ struct SolidStream::Impl {
       for (std::size_t i = 0; i < measured.size(); ++i) {
         SlabSums slab;
         if (!recall(*kept, range(i), slab)) continue;
-        sums += slab;
+        sums.add(slab, print_rules);
         measured[i] = true;
       }
       context.log("resumed the first pass and what was measured of " +
@@ -269,11 +271,10 @@ struct SolidStream::Impl {
     here.active_voxels = slab.solid.active_voxels(slab.range);
     if (design.recipe.print.check) {
       const Shape lumen = printed_lumen(distance_to(slab.body), shell_mm);
-      here.faults =
-          print_scan(slab.solid, lumen, design.recipe.print, design.recipe.verify.up, slab.range, quiet(context));
+      here.print = print_tally(slab.solid, lumen, design.recipe.print, print_rules, slab.range, quiet(context));
     }
     if (kept) fibrolite::keep(*kept, slab.range, here);
-    sums += here;
+    sums.add(here, print_rules);
     measured[number] = true;
   }
 
@@ -289,10 +290,8 @@ struct SolidStream::Impl {
     report.solid.voxel_mm = h;
     report_solid(made.tied, design.fills, sums.body_vox * h * h * h, sums.solid_vox * h * h * h, design.recipe.material,
                  report);
-    if (const PrintParams& limits = design.recipe.print; limits.check) {
-      Scan all = std::move(sums.faults);
-      drop_noise(all, limits, h);
-      report.print.found = summed(all, design.recipe.verify.up, node_mm(design.fills, limits));
+    if (design.recipe.print.check) {
+      report.print.found = sums.print.total(print_rules);
       report.print.checked = true;
     }
   }
@@ -304,6 +303,7 @@ struct SolidStream::Impl {
   const MeshVoxels voxels;
   std::vector<Shape> regions;
   std::vector<Sticks> sticks;
+  PatchRules print_rules;
   Mended made;                           ///< The ties; the solid stays empty.
   PieceSweep::Result found, hanging;     ///< Pieces; and what a skin of half a neck cuts off.
   std::vector<StickSweep> along_sticks;  ///< One for each of sticks.

@@ -10,8 +10,10 @@
 #include "fibrolite/error.h"
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/recipe.h"
+#include "fibrolite/random.h"
 #include "fibrolite/realize.h"
 #include "models.h"
+#include "print_limits.h"
 
 namespace fibrolite {
 namespace {
@@ -154,6 +156,55 @@ TEST(Printable, SameBitsOnOneAndTwoThreads) {
   EXPECT_EQ(results[0].thin_walls.worst[0].at_mm, results[1].thin_walls.worst[0].at_mm);
   EXPECT_EQ(results[0].overhangs.area_mm2, results[1].overhangs.area_mm2);
   EXPECT_EQ(results[0].lumen_mm2, results[1].lumen_mm2);
+}
+
+void expect_same(const PrintFault& a, const PrintFault& b) {
+  EXPECT_EQ(a.places, b.places);
+  EXPECT_EQ(a.area_mm2, b.area_mm2);
+  EXPECT_EQ(a.volume_mm3, b.volume_mm3);
+  EXPECT_EQ(a.least_mm, b.least_mm);
+  ASSERT_EQ(a.worst.size(), b.worst.size());
+  for (std::size_t i = 0; i < a.worst.size(); ++i) {
+    EXPECT_EQ(a.worst[i].at_mm, b.worst[i].at_mm);
+    EXPECT_EQ(a.worst[i].mm, b.worst[i].mm);
+    EXPECT_EQ(a.worst[i].area_mm2, b.worst[i].area_mm2);
+  }
+}
+
+/// Thin plates and slots, slanted and along the ranges, and a ceiling: in ranges thinner and thicker than a wall,
+/// scanned in whatever order, along each axis.
+TEST(Printable, the_same_in_ranges) {
+  const Shape slots = unite({placed(cuboid({{-4, -7, -0.2}, {4, 7, 0.3}}), frame_along({0, 0, 3}, {0.2, 0.1, 1})),
+                             placed(cuboid({{-4, -7, -0.2}, {4, 7, 0.3}}), frame_along({0, 0, -6}, {0, 0.1, 1}))});
+  const Solid solid =
+      make(unite({subtract(cuboid({{-7, -6, -8}, {7, 6, 6}}), unite({slots, cuboid({{-5, -4, -3}, {5, 4, 1}})})),
+                  placed(cuboid({{-0.2, -9, -9}, {0.3, 9, 9}}), frame_along({8.5, 0, 0}, {0.1, 0, 1})),
+                  sphere({-9, 0, -9}, 0.3), sphere({-9, 3, 5}, 0.35)}));
+  const Printable whole = printable(solid, everything(), limits, z, 1.6);
+  ASSERT_GE(whole.thin_walls.places, 2);
+  ASSERT_GE(whole.small_gaps.places, 2);
+  ASSERT_GE(whole.overhangs.places, 2);
+  const PatchRules rules = patch_rules(limits, z, 1.6, voxel);
+  Random random(1, "ranges");
+  for (int n = 0; n < 6; ++n) {
+    std::vector<SampleRange> ranges;
+    const int thick = n < 3 ? 2 : 17;
+    for (int at = -64; at < 64; at += thick) ranges.push_back({n % 3, at, at + thick});
+    for (std::size_t i = ranges.size() - 1; i > 0; --i)
+      std::swap(ranges[i],
+                ranges[std::min(i, static_cast<std::size_t>(random.uniform() * static_cast<double>(i + 1)))]);
+    PrintTally tally;
+    for (const SampleRange& range : ranges)
+      tally.add(print_tally(solid, everything(), limits, rules, range, {}), rules);
+    ASSERT_EQ(tally.runs.size(), 1U);
+    for (const PatchRun& kind : tally.runs[0].kinds) EXPECT_TRUE(kind.open.empty());
+    const Printable found = tally.total(rules);
+    expect_same(found.thin_walls, whole.thin_walls);
+    expect_same(found.small_gaps, whole.small_gaps);
+    expect_same(found.overhangs, whole.overhangs);
+    EXPECT_EQ(found.node_overhang_mm2, whole.node_overhang_mm2);
+    EXPECT_EQ(found.lumen_mm2, whole.lumen_mm2);
+  }
 }
 
 TEST(Printable, RefusesWhatIsNoLimit) {
