@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many capsules at once: a bucket grid lists, per bucket, every capsule that can be the nearest there or within reach.
+// Many capsules or cones at once: a bucket grid lists, per bucket, every one that can be the nearest there or within
+// reach.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,22 +20,49 @@ float distance(const Capsule& c, float x, float y, float z) {
   return static_cast<float>(norm(d - t * ab) - c.radius_mm);
 }
 
-struct CapsuleList final : Shape::Function {
-  explicit CapsuleList(std::vector<Capsule> all) : list(std::move(all)) {
-    for (const Capsule& c : list) {
-      bounds.include(c.a - Vec3d{c.radius_mm, c.radius_mm, c.radius_mm});
-      bounds.include(c.a + Vec3d{c.radius_mm, c.radius_mm, c.radius_mm});
-      bounds.include(c.b - Vec3d{c.radius_mm, c.radius_mm, c.radius_mm});
-      bounds.include(c.b + Vec3d{c.radius_mm, c.radius_mm, c.radius_mm});
+/// In the half plane of the axis it is a trapezoid: the distance to its nearest side, negative inside.
+float distance(const Frustum& c, float x, float y, float z) {
+  const Vec3d ab = c.b - c.a, d = Vec3d{x, y, z} - c.a;
+  const double length = norm(ab), along = dot(d, ab) / length;
+  const double out = std::sqrt(std::max(dot(d, d) - along * along, 0.0));
+  const double end = along - std::clamp(along, 0.0, length);
+  const double narrower = c.radius_b_mm - c.radius_a_mm;
+  const double t = std::clamp(
+      (along * length + (out - c.radius_a_mm) * narrower) / (length * length + narrower * narrower), 0.0, 1.0);
+  const double flank = std::hypot(along - t * length, out - c.radius_a_mm - t * narrower);
+  const double face_a = std::hypot(along, std::max(out - c.radius_a_mm, 0.0));
+  const double face_b = std::hypot(along - length, std::max(out - c.radius_b_mm, 0.0));
+  const bool inside = end == 0 && (out - c.radius_a_mm) * length < along * narrower;
+  const double nearest = std::min({flank, face_a, face_b});
+  return static_cast<float>(inside ? -nearest : nearest);
+}
+double width(const Capsule& c) { return 2 * c.radius_mm; }
+double width(const Frustum& c) { return 2 * std::max(c.radius_a_mm, c.radius_b_mm); }
+
+template <class Item>
+Box3d box_of(const Item& c) {
+  Box3d box;
+  box.include(c.a);
+  box.include(c.b);
+  return box.grown(0.5 * width(c));
+}
+
+template <class Item>
+struct BucketList final : Shape::Function {
+  explicit BucketList(std::vector<Item> all) : list(std::move(all)) {
+    for (const Item& c : list) {
+      const Box3d own = box_of(c);
+      bounds.include(own.min);
+      bounds.include(own.max);
     }
     fill_buckets();
   }
 
-  /// Buckets of one mean capsule length (at most 64 per axis); each lists the capsules within `reach` of it. A point
-  /// whose bucket lists none is at least `reach` away from all of them.
+  /// Buckets of one mean length (at most 64 per axis); each lists the items within `reach` of it. A point whose bucket
+  /// lists none is at least `reach` away from all of them.
   void fill_buckets() {
     double mean = 0;
-    for (const Capsule& c : list) mean += norm(c.b - c.a) + 2 * c.radius_mm;
+    for (const Item& c : list) mean += norm(c.b - c.a) + width(c);
     mean /= static_cast<double>(list.size());
     edge = std::max({mean, bounds.longest_side() / 64, 1e-3});
     reach = edge;
@@ -43,13 +71,10 @@ struct CapsuleList final : Shape::Function {
     n = {static_cast<int>(size.x / edge) + 1, static_cast<int>(size.y / edge) + 1, static_cast<int>(size.z / edge) + 1};
     const double half_diagonal = 0.5 * std::sqrt(3.0) * edge;
     start.assign(static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z) + 1, 0);
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;  // bucket, capsule
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;  // bucket, item
     for (std::uint32_t i = 0; i < list.size(); ++i) {
-      const Capsule& c = list[i];
-      Box3d box;
-      box.include(c.a);
-      box.include(c.b);
-      box = box.grown(c.radius_mm + reach);
+      const Item& c = list[i];
+      const Box3d box = box_of(c).grown(reach);
       const Vec3i from = bucket_of(box.min), to = bucket_of(box.max);
       for (int x = from.x; x <= to.x; ++x) {
         for (int y = from.y; y <= to.y; ++y) {
@@ -88,7 +113,7 @@ struct CapsuleList final : Shape::Function {
       for (std::uint32_t i = start[at]; i < start[at + 1]; ++i) {
         best = std::min(best, distance(list[items[i]], block.x[k], block.y[k], block.z[k]));
       }
-      // Capsules beyond the reach were not looked at: the distance is then at least the reach, or that to the box.
+      // Items beyond the reach were not looked at: the distance is then at least the reach, or that to the box.
       const Vec3d past{std::max({bounds.min.x - p.x, p.x - bounds.max.x, 0.0}),
                        std::max({bounds.min.y - p.y, p.y - bounds.max.y, 0.0}),
                        std::max({bounds.min.z - p.z, p.z - bounds.max.z, 0.0})};
@@ -96,7 +121,7 @@ struct CapsuleList final : Shape::Function {
     }
   }
 
-  std::vector<Capsule> list;
+  std::vector<Item> list;
   Box3d bounds;
   Vec3d low{};
   Vec3i n{};
@@ -107,7 +132,11 @@ struct CapsuleList final : Shape::Function {
 }  // namespace
 
 Shape capsules(std::vector<Capsule> list) {
-  return list.empty() ? nothing() : Shape(std::make_shared<const CapsuleList>(std::move(list)));
+  return list.empty() ? nothing() : Shape(std::make_shared<const BucketList<Capsule>>(std::move(list)));
+}
+
+Shape frusta(std::vector<Frustum> list) {
+  return list.empty() ? nothing() : Shape(std::make_shared<const BucketList<Frustum>>(std::move(list)));
 }
 
 }  // namespace fibrolite

@@ -103,7 +103,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     return made;
   });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
-    return checked_and_mended(tied, body, fills, sticks, ties, recipe, params.fix, report, c);
+    return checked_and_mended(tied, body, out.parts, fills, sticks, ties, recipe, params.fix, report, c);
   });
   out.solid = mended.tied.solid;
 

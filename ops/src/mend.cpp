@@ -38,23 +38,32 @@ void add_balls(const std::vector<Spot>& spots, bool wall, const MendParams& para
 Shape with_mends(const Shape& whole, const Shape& body, const Mended& m) {
   Shape result = with_ties(whole, body, m.tied.changes);
   if (!m.thickened.empty()) result = unite({result, intersect({body, capsules(m.thickened)})});
+  if (!m.pillars.empty()) result = unite({result, intersect({body, shape(m.pillars)})});
   if (!m.drains.empty()) result = subtract(result, capsules(shapes(m.drains)));
   return result;
 }
 
 Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const Context& context) {
-  Mended out{tied, {}, {}, 0};
+  Mended out{tied, {}, {}, {}, 0};
   const double voxel = body.grid().voxel_mm;
   const Shape b = distance_to(body), lumen = offset(b, -0.5 * params.shell_mm);
-  for (int round = 0; params.walls_and_gaps && round < rounds; ++round) {
+  const PillarParams bearing{.print = params.print,
+                             .up = params.up,
+                             .node_mm = params.node_mm,
+                             .shaft_mm = params.tie.strut_mm,
+                             .cell_mm = 2.5 * params.tie.strut_mm,
+                             .lattice = params.lattice};
+  for (int round = 0; params.faults && round < rounds; ++round) {
     const Scan found = print_scan(out.tied.solid, lumen, params.print, params.up, context);
     std::vector<Capsule> balls;
     add_balls(found.walls, true, params, voxel, balls);
     add_balls(found.gaps, false, params, voxel, balls);
-    if (balls.empty()) break;
-    const Shape thicker = unite({distance_to(out.tied.solid), intersect({b, capsules(balls)})});
+    const std::vector<Pillar> under = pillars(out.tied.solid, lumen, bearing, context);
+    if (balls.empty() && under.empty()) break;
+    const Shape thicker = unite({distance_to(out.tied.solid), intersect({b, unite({capsules(balls), shape(under)})})});
     out.tied = tie_again(out.tied, realize(thicker, body, context), body, params.tie, context);
     out.thickened.insert(out.thickened.end(), balls.begin(), balls.end());
+    out.pillars.insert(out.pillars.end(), under.begin(), under.end());
   }
   if (params.drain_mm == 0) return out;
   const double ball_vox = std::numbers::pi / 6 * std::pow(params.drain_mm / voxel, 3);

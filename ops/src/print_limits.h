@@ -13,6 +13,9 @@ namespace fibrolite {
 /// which prints as a fillet. @throws Error BadRecipe: a range of PrintParams.
 [[nodiscard]] Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up,
                               const Context& context);
+/// Steep spots alone.
+[[nodiscard]] std::vector<Spot> overhangs(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up,
+                                          const Context& context);
 /// The same for solids that come in ranges, which a tally joins.
 [[nodiscard]] PatchRules patch_rules(const PrintParams& params, Vec3d up, double node_mm, double voxel_mm);
 [[nodiscard]] PrintTally print_tally(const Solid& solid, const Shape& lumen, const PrintParams& params,

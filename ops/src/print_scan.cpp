@@ -49,6 +49,17 @@ class Window {
     const auto slope = [&](Vec3d step) { return value(p + step) - value(p - step); };
     return normalized(Vec3d{slope({0.5, 0, 0}), slope({0, 0.5, 0}), slope({0, 0, 0.5})});
   }
+  /// The same within two voxels of an edge of the solid, where normal() would be a mean of both faces: along each axis
+  /// the slope on the side that bends less, if the other bends far more.
+  [[nodiscard]] Vec3d face_normal(Vec3d p) const {
+    const double here = value(p);
+    const auto slope = [&](Vec3d step) {
+      const double a1 = value(p + step), a2 = value(p + 2 * step), b1 = value(p - step), b2 = value(p - 2 * step);
+      const double bend_a = std::abs(here - 2 * a1 + a2), bend_b = std::abs(here - 2 * b1 + b2);
+      return bend_a < 0.25 * bend_b ? a1 - here : bend_b < 0.25 * bend_a ? here - b1 : 0.5 * (a1 - b1);
+    };
+    return normalized(Vec3d{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})});
+  }
   /// How far from a surface point the sign changes again along a unit direction, voxels; infinity: not within `most`.
   /// `inside`: it runs through material.
   [[nodiscard]] double chord(Vec3d from, Vec3d along, bool inside, double most) const {
@@ -154,7 +165,10 @@ Scan scan_tile(const Solid& solid, const Shape& lumen, const ScanLimits& limits,
     if (!(depth[i] < 0)) continue;
     found.lumen_mm2 += std::nearbyint(spots[i].area_mm2 * exact_mm2) / exact_mm2;
     if (limits.gap_mm > 0) probe(spots[i], false, limits.gap_mm, found.gaps);
-    if (-dot(spots[i].normal, limits.up) > limits.steep_sine) found.steep.push_back(spots[i]);
+    // The crest of a vault between two slopes is no ceiling.
+    if (-dot(spots[i].normal, limits.up) > limits.steep_sine &&
+        -dot(window.face_normal(spots[i].foot_mm / h), limits.up) > limits.steep_sine)
+      found.steep.push_back(spots[i]);
   }
   return found;
 }

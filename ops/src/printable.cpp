@@ -41,6 +41,15 @@ Scan print_scan(const Solid& solid, const Shape& lumen, const PrintParams& param
   return found;
 }
 
+std::vector<Spot> overhangs(const Solid& solid, const Shape& lumen, const PrintParams& params, Vec3d up,
+                            const Context& context) {
+  ScanLimits limits = limits_of(params, up, solid.grid().voxel_mm);
+  limits.wall_mm = limits.gap_mm = 0;
+  Scan found = scan(solid, lumen, limits, context);
+  drop_small_patches(found.steep, least_mm2(params, solid.grid().voxel_mm)[2]);
+  return std::move(found.steep);
+}
+
 PatchRules patch_rules(const PrintParams& params, Vec3d up, double node_mm, double voxel_mm) {
   // A wall's sample lies in its middle.
   const double across_mm = std::max(params.wall_mm, params.gap_mm);

@@ -186,17 +186,38 @@ double node_mm(const std::vector<Fill>& fills, const PrintParams& limits) {
 
 Shape printed_lumen(const Shape& body, double shell_mm) { return offset(body, -0.5 * shell_mm); }
 
-Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector<Fill>& fills,
+namespace {
+
+/// All crystal, which says by itself how steep it is (TcsParams::stretch_z).
+Shape lattice(const Parts& parts, const std::vector<Fill>& fills) {
+  std::vector<Shape> all;
+  for (std::size_t i = 0; i < fills.size(); ++i)
+    if (fills[i].fibres == 0) all.push_back(intersect({parts.parts[i].region(), fills[i].shape}));
+  return unite(std::move(all));
+}
+
+}  // namespace
+
+Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& parts, const std::vector<Fill>& fills,
                           const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe, bool fix,
                           Report& report, const Context& context) {
   const PrintParams& limits = recipe.print;
   const double voxel = body.grid().voxel_mm, shell_mm = recipe.shell.thickness_mm;
   const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
-  Mended out{tied, {}, {}, 0};
+  Mended out{tied, {}, {}, {}, 0};
   const bool mending = fix || drain_mm > 0;
   if (!mending && !limits.check) return out;
   if (mending) {
-    out = mend(tied, body, {limits, fix, drain_mm, recipe.verify.up, shell_mm, ties}, context);
+    out = mend(tied, body,
+               {.print = limits,
+                .faults = fix,
+                .drain_mm = drain_mm,
+                .up = recipe.verify.up,
+                .shell_mm = shell_mm,
+                .tie = ties,
+                .node_mm = node_mm(fills, limits),
+                .lattice = lattice(parts, fills)},
+               context);
     TieParams around = ties;
     around.keep_out = capsules(shapes(out.drains));
     const Solid& solid = out.tied.solid;  // from here on the whole
@@ -209,8 +230,14 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const std::vector
   const Shape lumen = printed_lumen(distance_to(body), shell_mm);
   report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm(fills, limits), context);
   report.print.checked = true;
+  const Printable& found = report.print.found;
+  if (fix && !recipe.tcs.stretch_z && found.overhangs.area_mm2 > 0.01 * found.lumen_mm2)
+    report.warnings.push_back(
+        "the crystal's own sticks are flatter than print.overhang_deg allows, which --fix leaves: use --preset fdm or "
+        "--set tcs.stretch_z=true");
   report.print.drains = out.drains;
   report.print.thickened = static_cast<std::int64_t>(out.thickened.size());
+  report.print.pillars = static_cast<std::int64_t>(out.pillars.size());
   report.print.voids_filled = out.voids_filled;
   return out;
 }
@@ -303,6 +330,7 @@ std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid&
   if (const auto removed = mended.tied.removed(); !removed.empty()) add("removed", capsules(removed));
   if (const auto struts = mended.tied.struts(); !struts.empty()) add("ties", capsules(struts));
   if (!mended.thickened.empty()) add("thickened", capsules(mended.thickened));
+  if (!mended.pillars.empty()) add("pillars", shape(mended.pillars));
   if (!mended.drains.empty()) add("drains", capsules(shapes(mended.drains)));
   // What cleaning changed: material that went, void that was filled.
   const Shape before = with_mends(distance_to(raw), b, mended);

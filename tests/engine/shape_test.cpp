@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "fibrolite/frame.h"
 #include "fibrolite/random.h"
 
 namespace fibrolite {
@@ -44,6 +45,30 @@ TEST(Primitives, a_round_cone_is_the_union_of_the_spheres_between_its_ends) {
     }
     if (best > 0) {
       ASSERT_NEAR(cone(p), best, 1e-3);
+    }
+  }
+}
+
+/// The nearest of many points on its two faces and its flank, and the sign by what it is made of: discs.
+TEST(Primitives, a_frustum_is_as_near_as_its_nearest_point) {
+  const Vec3d a{1, 2, 3}, b{4, -1, 5};
+  const Frame frame = frame_along(a, b - a);
+  const double length = norm(b - a);
+  for (const auto& [radius_a, radius_b] : {std::pair(0.4, 3.0), std::pair(2.0, 2.0), std::pair(3.0, 0.0)}) {
+    const Shape cone = frusta({{a, radius_a, b, radius_b}});
+    Random random(4, "frustum");
+    for (int i = 0; i < 200; ++i) {
+      const Vec3d p = a + point(random, 10), local = frame.to_local(p);
+      const double out = std::hypot(local.x, local.y);
+      double best = 1e9;
+      for (int k = 0; k <= 4000; ++k) {
+        const double t = k / 4000.0, radius = radius_a + t * (radius_b - radius_a);
+        best = std::min({best, std::hypot(out - radius, local.z - t * length), std::hypot(out - t * radius_a, local.z),
+                         std::hypot(out - t * radius_b, local.z - length)});
+      }
+      const double t = local.z / length;
+      const bool inside = t > 0 && t < 1 && out < radius_a + t * (radius_b - radius_a);
+      ASSERT_NEAR(cone(p), inside ? -best : best, 2e-3);
     }
   }
 }

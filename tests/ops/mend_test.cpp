@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "fibrolite/realize.h"
 
@@ -29,16 +30,14 @@ struct Case {
   Solid body;
   Tied tied;
 };
-const PrintParams print{.wall_mm = 0.8, .gap_mm = 0.6};
-MendParams params(bool walls_and_gaps, double drain_mm) {
-  return {.print = print, .walls_and_gaps = walls_and_gaps, .drain_mm = drain_mm};
-}
+const PrintParams print{.wall_mm = 0.8, .gap_mm = 0.6, .overhang_deg = 90};  // ceilings may stay
+MendParams params(bool faults, double drain_mm) { return {.print = print, .faults = faults, .drain_mm = drain_mm}; }
 
 TEST(Mend, AThinWallGetsAsThickAsAsked) {
   const Case thin(placed(cuboid({{-20, -20, -0.25}, {20, 20, 0.25}}), frame_along({}, {0.3, 0, 1})));
   const double before = thin.tied.solid.volume_mm3();
   const Mended made = mend(thin.tied, thin.body, params(true, 0));
-  EXPECT_EQ(thin.checked(Mended{thin.tied, {}, {}, 0}, print).thin_walls.places, 1);
+  EXPECT_EQ(thin.checked(Mended{thin.tied, {}, {}, {}, 0}, print).thin_walls.places, 1);
   EXPECT_EQ(thin.checked(made, print).thin_walls.places, 0);
   // 0.3 mm more over the section of the lumen.
   const double section = 14 * 14 * std::sqrt(1 + 0.09);
@@ -52,10 +51,51 @@ TEST(Mend, AThinWallGetsAsThickAsAsked) {
 
 TEST(Mend, ASmallGapIsClosed) {
   const Case split(subtract(everything(), cuboid({{-5, -20, -0.2}, {5, 20, 0.25}})));
-  ASSERT_GT(split.checked(Mended{split.tied, {}, {}, 0}, print).small_gaps.places, 0);
+  ASSERT_GT(split.checked(Mended{split.tied, {}, {}, {}, 0}, print).small_gaps.places, 0);
   const Mended made = mend(split.tied, split.body, params(true, 0));
   EXPECT_EQ(split.checked(made, print).small_gaps.places, 0);
   EXPECT_NEAR(made.tied.solid.volume_mm3(), 16 * 16 * 16, 0.002 * 4096);
+}
+
+/// The ceiling of a room, level and sloping; what bears it is steep enough itself, and one piece with it.
+TEST(Mend, ACeilingGetsPillars) {
+  for (const double slope : {0.0, 0.5}) {
+    const Shape ceiling = half_space({0, 0, slope == 0 ? 20.0 : 2.0}, {-slope, 0, 1});
+    const Case chamber(complement(ceiling));
+    PrintParams steep = print;
+    steep.overhang_deg = 45;
+    const auto checked = [&](const Mended& made) { return chamber.checked(made, steep); };
+    const PrintFault before = checked({chamber.tied, {}, {}, {}, 0}).overhangs;
+    ASSERT_EQ(before.places, 1);
+    EXPECT_NEAR(before.area_mm2, 14 * 14 * std::hypot(1, slope), 14);
+    MendParams asked = params(true, 0);
+    asked.print = steep;
+    asked.node_mm = 1.6;
+    std::vector<Mended> results;
+    for (const std::size_t threads : {1U, 2U}) {
+      const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+      results.push_back(mend(chamber.tied, chamber.body, asked));
+    }
+    const Mended& made = results[0];
+    const Printable after = checked(made);
+    EXPECT_EQ(after.overhangs.places, 0) << after.overhangs.area_mm2;
+    EXPECT_LT(after.node_overhang_mm2, 0.05 * before.area_mm2);
+    EXPECT_EQ(after.thin_walls.places, 0);
+    EXPECT_EQ(after.small_gaps.places, 0);
+    EXPECT_EQ(made.tied.left.material.size(), 1U);
+    EXPECT_EQ(made.tied.left.cavities.size(), 1U);
+    EXPECT_EQ(made.tied.solid.volume_mm3(), results[1].tied.solid.volume_mm3());
+    // A pillar per cell of 2 mm radius that the ceiling reaches into; heads that widen from the shaft's 0.4 mm to the
+    // cell's rim by 45 degrees, all of the slope's rise within a cell higher; the last on shafts of at most 14 mm.
+    const double added = made.tied.solid.volume_mm3() - chamber.tied.solid.volume_mm3();
+    const auto pillars = static_cast<double>(made.pillars.size());
+    EXPECT_LE(pillars, 18 * 18 / (1.5 * std::sqrt(3.0) * 2 * 2));
+    const double wide = 2 * (1 + slope) + 2 * voxel, high = wide - 0.4, pi = std::numbers::pi;
+    EXPECT_LT(added, pillars * pi * (high / 3 * (0.16 + 0.4 * wide + wide * wide) + 0.16 * 14));
+    EXPECT_GT(added, 0.5 * 14 * 14);
+    const Solid again = realize(with_mends(chamber.whole, distance_to(chamber.body), made), chamber.body);
+    EXPECT_NEAR(again.volume_mm3(), made.tied.solid.volume_mm3(), 1e-3 * again.volume_mm3());
+  }
 }
 
 TEST(Mend, WhatTheModelMakesThinStays) {

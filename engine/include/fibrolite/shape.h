@@ -90,6 +90,14 @@ struct Capsule {
   double radius_mm;
 };
 [[nodiscard]] Shape capsules(std::vector<Capsule> list);
+/// Many flat-ended cones at once, likewise, each between the centres of its end faces, which differ.
+struct Frustum {
+  Vec3d a;
+  double radius_a_mm;
+  Vec3d b;
+  double radius_b_mm;
+};
+[[nodiscard]] Shape frusta(std::vector<Frustum> list);
 /// The shape seen from a frame: value at p is `local` at frame.to_local(p).
 [[nodiscard]] Shape placed(Shape local, const Frame& frame);
 

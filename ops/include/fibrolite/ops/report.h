@@ -104,6 +104,7 @@ struct PrintReport {
   Printable found;
   std::vector<Drain> drains;
   std::int64_t thickened = 0;     ///< Balls put into thin walls and small gaps.
+  std::int64_t pillars = 0;       ///< Under overhangs.
   std::int64_t voids_filled = 0;  ///< Enclosed, too small for a hole.
 };
 /// The layers of one plate.
