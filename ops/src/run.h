@@ -94,9 +94,10 @@ struct Design {
 /// Where gaps and steep faces matter to a printer.
 [[nodiscard]] Shape printed_lumen(const Shape& body, double shell_mm);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
-[[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& parts, const std::vector<Fill>& fills,
-                                        const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe,
-                                        bool fix, Report& report, const Context& context);
+[[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& parts,
+                                        const std::vector<Fill>& fills, const std::vector<Sticks>& sticks,
+                                        const TieParams& ties, const Recipe& recipe, bool fix, Report& report,
+                                        const Context& context);
 /// Every step as a grid of its own (see Hybrid::steps).
 [[nodiscard]] std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid& made,
                                             const std::vector<Fill>& fills, const Mended& mended,
