@@ -73,6 +73,8 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   return list;
 }
 
+constexpr double rounding = 1 - 1e-9;  // 0.8 mm at a voxel of 0.4 mm is two voxels, whatever the last bit says
+
 [[noreturn]] void unfit(const std::string& what, const std::string& where, const std::string& hint) {
   throw Error(Code::BadRecipe, what, where, hint);
 }
@@ -121,7 +123,16 @@ void check_mfs(const MfsParams& mfs) {
           "recipe", "use more than " + number_text(least) + ", or thinner walls");
 }
 
-void check_joint(const JointParams& joint) {
+void check_joint(const JointParams& joint, double wall_mm) {
+  // What a run adds by itself must not be what its own print checks then find too thin.
+  const auto printable = [wall_mm](const char* key, double mm) {
+    if (mm < wall_mm * rounding)
+      unfit(std::string(key).append(" is ").append(number_text(mm)).append(" mm, thinner than print.wall_mm"), "recipe",
+            "use " + number_text(wall_mm) + " or more, or a smaller print.wall_mm");
+  };
+  printable("joint.layer_mm", joint.layer_mm);
+  if (joint.columns) printable("joint.column_mm", joint.column_mm);
+  printable("joint.min_wall_mm", joint.min_wall_mm);
   if (joint.spacing_mm <= joint.column_mm)
     unfit("joint.spacing_mm is " + number_text(joint.spacing_mm) + ", columns would touch", "recipe",
           "use more than " + number_text(joint.column_mm) + " (joint.column_mm)");
@@ -166,15 +177,14 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   if (hybrid && recipe.partition.by == PartBy::Load && !recipe.partition.overrides.cuts.empty())
     unfit("partition.overrides.cuts part by shape, but partition.by is load", "recipe", "use partition.by=both");
   if (infill == InfillKind::Gyroid) (void)density(recipe.gyroid);
-  if (hybrid && recipe.joint.enabled) check_joint(recipe.joint);
+  if (hybrid && recipe.joint.enabled) check_joint(recipe.joint, recipe.print.wall_mm);
 
   const double drain_mm = recipe.print.drain_mm.value_or(0);
-  if (drain_mm > 0 && drain_mm < 2 * voxel_mm * (1 - 1e-9))
+  if (drain_mm > 0 && drain_mm < 2 * voxel_mm * rounding)
     unfit("print.drain_mm is " + number_text(drain_mm) + " mm, narrower than 2 voxels",
           "voxel " + number_text(voxel_mm) + " mm",
           "use " + number_text(2 * voxel_mm) + " or more, or a smaller --voxel");
 
-  constexpr double rounding = 1 - 1e-9;  // 0.8 mm at a voxel of 0.4 mm is two voxels, whatever the last bit says
   for (const Feature& feature : features(recipe, infill))
     if (feature.mm < 2 * voxel_mm * rounding)
       unfit(std::string(feature.key)

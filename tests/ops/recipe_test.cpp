@@ -394,6 +394,28 @@ TEST(CheckRecipe, NumbersMustFitEachOther) {
   EXPECT_THAT(refused("joint.spacing_mm=0.8"), HasSubstr("joint.spacing_mm"));
 }
 
+/// Columns, layer and bridges respect the minimum wall: refused, each by its own name, where a joint is made.
+TEST(CheckRecipe, WhatJointsAddIsNoThinnerThanTheMinimumWall) {
+  const auto refused = [](const Recipe& recipe, InfillKind infill = InfillKind::Hybrid) {
+    return refusal([&] { check_recipe(recipe, 0, infill); });
+  };
+  for (const std::string key : {"joint.layer_mm", "joint.column_mm", "joint.min_wall_mm"}) {
+    const Recipe thin = set(Recipe{}, key + "=0.3");
+    EXPECT_THAT(refused(thin), AllOf(HasSubstr(key + " is 0.3 mm, thinner than print.wall_mm"),
+                                     HasSubstr("use 0.4 or more, or a smaller print.wall_mm")));
+    EXPECT_EQ(refused(set(thin, "print.wall_mm=0.3")), "");
+    EXPECT_EQ(refused(set(Recipe{}, key + "=0.4")), "");
+    EXPECT_EQ(refused(set(thin, "joint.enabled=false")), "");
+    EXPECT_EQ(refused(thin, InfillKind::Tcs), "");
+  }
+  // A wider wall asked for counts as well: columns and bridges of 0.8 mm, layers of 1.2 mm.
+  EXPECT_EQ(refused(set(Recipe{}, "print.wall_mm=0.8")), "");
+  EXPECT_THAT(refused(set(Recipe{}, "print.wall_mm=0.9")), HasSubstr("joint.column_mm is 0.8 mm"));
+  const Recipe alone = set(set(Recipe{}, "print.wall_mm=0.9"), "joint.columns=false");
+  EXPECT_THAT(refused(alone), HasSubstr("joint.min_wall_mm is 0.8 mm"));
+  EXPECT_EQ(refused(set(alone, "joint.min_wall_mm=0.9")), "");
+}
+
 TEST(Recipe, ADrainIsAtLeastTwoVoxelsWideOrNone) {
   const Recipe drained = set(Recipe{}, "print.drain_mm=0.6");
   EXPECT_NO_THROW(check_recipe(drained, 0.3));

@@ -19,11 +19,11 @@ struct JointParams {
   bool enabled = true;
   bool columns = true;  ///< Support columns; without them the layer alone joins, where it touches.
   Bridge bridge = Bridge::Mst;
-  double layer_mm = 1.2;     ///< Thickness of the transient layer (half in each part); 2 voxels or more.
-  double column_mm = 0.8;    ///< Diameter of a support column; 2 voxels or more.
+  double layer_mm = 1.2;     ///< Thickness of the transient layer (half in each part); 2 voxels, print.wall_mm or more.
+  double column_mm = 0.8;    ///< Diameter of a support column; 2 voxels, print.wall_mm or more.
   double spacing_mm = 3.0;   ///< Poisson-disk distance between support columns; more than column_mm.
   double reach_mm = 12;      ///< A column that meets no crystal within this is dropped (2 cells).
-  double min_wall_mm = 0.8;  ///< Width of a bridge.
+  double min_wall_mm = 0.8;  ///< Width of a bridge; 2 voxels, print.wall_mm or more.
 };
 
 /// The transient layer as a binary section image in the interface's frame (paper Sec. 6.1), and how it was joined.

@@ -63,8 +63,9 @@ struct RecipeKey {
 /// Every key, in the order of to_json().
 [[nodiscard]] std::vector<RecipeKey> recipe_keys();
 
-/// What the numbers must be to each other, and that everything `infill` makes is at least two voxels thick. A voxel of
-/// 0 checks the first alone. Only features that `infill` uses matter. @throws Error BadRecipe, naming the key.
+/// What the numbers must be to each other (layers, columns and bridges of joints no thinner than print.wall_mm), and
+/// that everything `infill` makes is at least two voxels thick. A voxel of 0 checks the first alone. Only features that
+/// `infill` uses matter. @throws Error BadRecipe, naming the key.
 void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill = InfillKind::Hybrid);
 /// What find_cores() needs to know: numbers of the partition, and a diameter that holds two fibres and a wall around.
 [[nodiscard]] CoreParams core_params(const Recipe& recipe);
