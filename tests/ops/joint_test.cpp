@@ -5,12 +5,18 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "fibrolite/error.h"
+#include "fibrolite/ops/assemble.h"
+#include "fibrolite/ops/infill/mfs.h"
 #include "fibrolite/ops/infill/tcs.h"
+#include "fibrolite/pieces.h"
 #include "fibrolite/random.h"
+#include "fibrolite/realize.h"
+#include "part_maker.h"
 
 namespace fibrolite {
 namespace {
@@ -258,6 +264,60 @@ TEST(Joint, ContactIsCrystalInTheFacePlusTheColumns) {
   const Joint joint = join(round_interface(), everything(), rods, false, true, 0.8, body, shell, 1, 0, {});
   EXPECT_NEAR(joint.contact_area_mm2, 2 * pi / 4, 0.08);
   EXPECT_TRUE(joint.columns.empty()) << "sticks that run straight up hang over nothing";
+}
+
+/// Fibres of their own for the half of the body below (id 0) or above (id 1) the joint.
+Fill fibres_of_half(int id) {
+  const double side = id == 0 ? -1 : 1;
+  PartMaker::Fields fields;
+  fields.id = id;
+  fields.kind = Kind::Column;
+  fields.region = half_space({}, {0, 0, -side});
+  fields.bounds_mm = {{-radius, -radius, std::min(0.0, 30 * side)}, {radius, radius, std::max(0.0, 30 * side)}};
+  fields.axis = Axis::straight({0, 0, std::min(0.0, 30 * side)}, {0, 0, std::max(0.0, 30 * side)});
+  return generate(PartMaker::make(fields), MfsParams{}, body, shell);
+}
+
+/// Share of the lumen's section at a height where this is material.
+double share_of_lumen(const Shape& shape, double z) {
+  constexpr double step = 0.04;
+  double inside = 0, material = 0;
+  for (double x = -9; x <= 9; x += step)
+    for (double y = -9; y <= 9; y += step) {
+      if (std::hypot(x, y) > radius - shell) continue;
+      ++inside;
+      material += shape({x, y, z}) < 0 ? 1 : 0;
+    }
+  return material / inside;
+}
+
+// Two columns of fibres that meet at a plane. Membranes run straight on into the layer, so all of the section of the
+// side that has less touches it; two patterns that know nothing of each other cover 1 - (1 - a) (1 - b) of the lumen.
+TEST(Joint, FibresMeetFibres) {
+  const Fill below = fibres_of_half(0), above = fibres_of_half(1);
+  const double lumen = pi * (radius - shell) * (radius - shell);
+  const double a = share_of_lumen(below.shape, -0.6), b = share_of_lumen(above.shape, 0.6);
+  EXPECT_NEAR(a, 0.58, 0.06);  // as mfs_test counts it
+  const Joint joint = join(round_interface(), below.shape, above.shape, false, false, 0, body, shell, 1, 0, {});
+  EXPECT_EQ(joint.layer.regions_after, 1);
+  EXPECT_TRUE(joint.columns.empty());
+  EXPECT_EQ(joint.columns_dropped, 0);
+  EXPECT_TRUE(joint.warnings.empty());
+  EXPECT_NEAR(joint.contact_area_mm2, std::min(a, b) * lumen, 0.01 * lumen);
+  const double both = 1 - (1 - a) * (1 - b), ring = pi * radius * radius - lumen;
+  EXPECT_NEAR(joint.layer.union_area_mm2, ring + both * lumen, 0.05 * lumen);
+
+  const AssembleParams params{.shell_mm = shell, .overlap_mm = 0.25};
+  const Shape whole =
+      assemble(body, {{half_space({}, {0, 0, 1}), below.shape}, {half_space({}, {0, 0, -1}), above.shape}},
+               {joint.shape}, params);
+  const Solid solid = realize(whole, {{-12, -12, -32}, {12, 12, 32}}, {.voxel_mm = 0.25});
+  EXPECT_EQ(pieces(solid).material.size(), 1U);
+  // Inside the shell, too: what is left of both columns hangs together by the layer.
+  const Solid core = realize(intersect({whole, cylinder({0, 0, -28}, {0, 0, 28}, radius - shell - 0.3)}),
+                             {{-12, -12, -32}, {12, 12, 32}}, {.voxel_mm = 0.25});
+  const CleanResult left = clean(core, {.drop_below_vox = 32, .fill_below_vox = 0});
+  EXPECT_EQ(left.left.material.size(), 1U);
 }
 
 TEST(Joint, CrystalTooThinToEndInIsDroppedAndCounted) {
