@@ -9,8 +9,11 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "fibrolite/random.h"
+#include "fibrolite/realize.h"
+#include "fibrolite/surface.h"
 #include "fibrolite/vdb.h"
 #include "hybrid_runs.h"
 #include "models.h"
@@ -96,6 +99,45 @@ TEST(Hybridize, a_graded_crystal_has_the_wanted_density_in_the_mean) {
   EXPECT_THAT(thick.warnings,
               ElementsAre(HasSubstr("tcs.density: 0.13 was asked for, 0.1"), HasSubstr("solid.neck_mm: necks were")));
   EXPECT_GT(thick.parts.at(0).infill_volume_mm3, 1.02 * 0.13 * thick.parts.at(0).lumen_mm3);
+}
+
+/// `tcs.grade=stress` in a whole run. A bar that is half as thick from its middle on is pulled: twice the stress there,
+/// which is the full one (95 % of the volume stay below it), so sticks get the most; half the stress before, half of
+/// the way there.
+TEST(Hybridize, sticks_are_thicker_where_the_coarse_solve_carries_more) {
+  const Box3d thick{{0, 0, 0}, {32, 24, 24}}, thin{{30, 0, 6}, {64, 24, 18}};
+  const Mesh bar =
+      surface(realize(unite({cuboid(thick), cuboid(thin)}), {{-4, -4, -4}, {68, 28, 28}}, {.voxel_mm = 1}));
+  HybridizeParams params{.recipe = sturdy(), .voxel_mm = 0.5, .function = true};
+  for (const char* assignment :
+       {"tcs.grade=stress", "tcs.grade_depth_mm=6", R"(partition.overrides={"parts": [{"id": 0, "infill": "tcs"}]})",
+        R"(loads=[{"name": "pulled", "supports": [{"where": {"lowest": {"share": 0.05, "along": [1, 0, 0]}}}],
+            "forces": [{"force_n": 50, "direction": [1, 0, 0], "where": {"seen_from": [1, 0, 0], "box_mm": [[60, -1, 5], [66, 25, 19]]}}]}])"})
+    params.recipe = set(params.recipe, assignment);
+  params.recipe.print.check = false;
+  const Outcome made = hybridized(bar, params);
+  ASSERT_EQ(made.report.parts.size(), 1U);
+  EXPECT_EQ(made.report.solid.pieces, 1);
+
+  // Half way along each stick inside the lumen: how thick it is made, over how thick the recipe says.
+  const TcsParams& tcs = params.recipe.tcs;
+  const auto factors = [&](const Box3d& where) {
+    std::vector<double> found;
+    each_stick(tcs, where, [&](const Capsule& stick) {
+      const Vec3d middle = 0.5 * (stick.a + stick.b);
+      if (where.contains(middle)) found.push_back(-made.hybrid.printed(middle) / (0.5 * tcs.stick_mm));
+    });
+    std::sort(found.begin(), found.end());
+    return found;
+  };
+  const auto median = [](const std::vector<double>& sorted) { return sorted.at(sorted.size() / 2); };
+  // Clear of shell, clamp, step and the face that is pulled.
+  const std::vector<double> before = factors({{9, 3, 3}, {18, 21, 21}}), after = factors({{42, 3, 9}, {58, 21, 15}});
+  ASSERT_GT(before.size(), 100U);
+  ASSERT_GT(after.size(), 50U);
+  EXPECT_NEAR(median(before), 0.5 * (tcs.grade_least + tcs.grade_most), 0.04);
+  EXPECT_NEAR(median(after), tcs.grade_most, 0.04);
+  EXPECT_LT(before.back(), after.front());
 }
 
 TEST(Hybridize, print_checks_can_be_left_out) {
