@@ -60,6 +60,27 @@ TEST(Hybridize, every_form_of_the_crystal_gives_one_piece_of_the_wanted_density)
   }
 }
 
+/// In a shell the sheet's two labyrinths are closed voids of half the lumen's void each: the report says so, and one
+/// hole through the membrane and one through the shell drain both.
+TEST(Hybridize, a_sheet_in_a_shell_has_two_voids_that_drain) {
+  const Mesh box = testing::cube(26);
+  HybridizeParams params{.recipe = sturdy(), .infill = InfillKind::Tcs, .voxel_mm = 0.3};
+  params.recipe.tcs = {.form = TcsForm::Sheet, .cell_mm = 8, .wall_mm = 0.8, .shift_mm = {2, 2, 2}};
+  const Report closed = hybridized(box, params).report;
+  const PartReport& part = closed.parts.at(0);
+  EXPECT_EQ(closed.solid.pieces, 1);
+  EXPECT_EQ(closed.solid.cavities, 2);
+  EXPECT_NEAR(closed.solid.cavity_volume_mm3 / (part.lumen_mm3 - part.infill_volume_mm3), 1, 0.02);
+  params.recipe.print.drain_mm = 2;
+  const Report drained = hybridized(box, params).report;
+  EXPECT_EQ(drained.solid.pieces, 1);
+  EXPECT_EQ(drained.solid.cavities, 0);
+  ASSERT_EQ(drained.print.drains.size(), 2U);
+  EXPECT_EQ(
+      std::count_if(drained.print.drains.begin(), drained.print.drains.end(), [](const Drain& d) { return d.outward; }),
+      1);
+}
+
 /// Counted in the finished solid at random points, not taken from the report.
 double crystal_share(const Outcome& made, double shell_mm) {
   Random random(3, "hybridize_test");

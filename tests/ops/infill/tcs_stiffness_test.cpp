@@ -59,10 +59,15 @@ class Prism {
     problem_.young_mpa = 1000;
     problem_.poisson = poisson;
     problem_.residual = 1e-6;
+    Box3d middle = all.grown(cell_);
+    middle.min.z = low() + cell_;
+    middle.max.z = low() + 2 * cell_;
+    problem_.unmeasured = complement(cuboid(middle));  // stress of the middle cell alone
   }
   struct Response {
     double strain;  ///< Along z.
     Vec3d stress;   ///< Along the axes, over Young's modulus.
+    double p99;     ///< Of the von Mises stress of the material, over Young's modulus.
   };
   /// Under a stress along z (over Young's modulus), its sides moved outward by these strains.
   [[nodiscard]] Response under(double stress, double strain_x, double strain_y) const {
@@ -80,7 +85,7 @@ class Prism {
     problem.forces.push_back(
         {plane(2, top() + cell_ / 4), {0, 0, stress == 0 ? least_n : stress * problem.young_mpa * width_ * width_}});
     const VoxelFemResult result = solve(problem);
-    return {strain(result), mean_stress(result)};
+    return {strain(result), mean_stress(result), result.p99_von_mises_mpa / problem.young_mpa};
   }
 
  private:
@@ -201,6 +206,24 @@ TEST_F(CrystalStiffness, a_sheet_stretches) {
   EXPECT_GT(s.bulk(), 0.75 * most_bulk(density));
   EXPECT_LT(s.bulk(), most_bulk(density));
   EXPECT_NEAR(s.mean_young(), 0.073, 0.1 * 0.073);
+}
+
+/// Pressure along [001] at first yield, over yield stress: 99 % of the middle cell's material is at or below p99. Of
+/// the same mass the sheet carries about twice as much as sticks do, whichever their balls. Within 3 % from 45 voxels
+/// to a cell to 99.
+TEST_F(CrystalStiffness, a_sheet_carries_twice_as_much_per_gram_as_sticks) {
+  constexpr double e = 0.001;
+  const auto carried = [](const TcsParams& params) { return e / Prism(sized(params), 23).under(-e, 0, 0).p99; };
+  const double sheet = carried({.form = TcsForm::Sheet, .density = density}), sticks = carried({.density = density}),
+               smaller_balls = carried({.stick_mm = 0.8, .ball_mm = 1.2, .density = density});
+  RecordProperty("sheet", std::to_string(sheet));
+  RecordProperty("sticks", std::to_string(sticks));
+  RecordProperty("sticks_smaller_balls", std::to_string(smaller_balls));
+  // Whatever its shape, in the mean of the material the stress along the load is pressure / density.
+  EXPECT_LT(sheet, density);
+  EXPECT_GT(sheet, 0.5 * density);
+  EXPECT_NEAR(sheet / sticks, 2.3, 0.1 * 2.3);
+  EXPECT_NEAR(sheet / smaller_balls, 1.83, 0.1 * 1.83);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -13,6 +14,7 @@
 
 #include "bounds.h"
 #include "fibrolite/error.h"
+#include "fibrolite/pieces.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
 
@@ -179,6 +181,45 @@ TEST(Sheet, holds_area_times_thickness_less_what_its_curvature_takes) {
     const double expected = a * t + 2 * pi * chi * t * t * t / 12;
     EXPECT_NEAR(density(p) / expected, 1.0, 0.006) << t;
     EXPECT_NEAR(share(crystal(p), p.cell_mm, 120) / expected, 1.0, 0.006) << t;
+  }
+}
+
+/// The membrane parts space into two labyrinths of equal size. Cut open, both run out through every face of a box and
+/// no void is left behind. In a shell both are closed voids that reach every wall; a flat wall may also cut off the
+/// tips of either, a few thousandths of the void.
+TEST(Sheet, two_labyrinths_open_to_every_face) {
+  constexpr double side = 24, voxel = 0.25;
+  const Box3d box =
+      Box3d{{0, 0, 0}, {side - voxel, side - voxel, side - voxel}}.grown(0.5 * voxel);  // walls between samples
+  for (const Vec3d shift : {Vec3d{0, 0, 0}, Vec3d{1, 1, 1}, Vec3d{1.3, 0.7, 2.9}, Vec3d{3, 1, 0.4}}) {
+    const TcsParams p{.form = TcsForm::Sheet, .cell_mm = 8, .wall_mm = 0.8, .shift_mm = shift};
+    const Shape sheet = crystal(p);
+    const Pieces open = pieces(realize(intersect({sheet, cuboid(box)}), box.grown(2), {.voxel_mm = voxel}));
+    EXPECT_TRUE(open.cavities.empty());
+
+    const Shape filled = intersect({unite({sheet, complement(cuboid(box))}), cuboid(box.grown(1))});
+    const VoidMap voids(realize(filled, box.grown(3), {.voxel_mm = voxel}));
+    const std::vector<Piece>& found = voids.cavities();
+    ASSERT_GE(found.size(), 2U);
+    const double half = 0.5 * (1 - density(p)) * side * side * side;
+    EXPECT_NEAR(found[0].volume_mm3 / half, 1, 0.03);  // counted by samples, three to a wall
+    EXPECT_NEAR(found[1].volume_mm3 / found[0].volume_mm3, 1, 0.005);
+    double tips = 0;
+    for (std::size_t i = 2; i < found.size(); ++i) tips += found[i].volume_mm3;
+    EXPECT_LT(tips, 5e-3 * half);
+    const int n = static_cast<int>(side / voxel);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int layer : {0, n - 1}) {
+        std::array<int, 3> samples{};  // neither, and each labyrinth
+        for (int i = 0; i < n; ++i)
+          for (int j = 0; j < n; ++j) {
+            const Vec3i at = axis == 0 ? Vec3i{layer, i, j} : axis == 1 ? Vec3i{j, layer, i} : Vec3i{i, j, layer};
+            const int place = voids.at(at);
+            ++samples.at(place == 1 || place == 2 ? static_cast<std::size_t>(place) : 0);
+          }
+        EXPECT_GT(samples[1], n * n / 10) << axis << ' ' << layer;
+        EXPECT_GT(samples[2], n * n / 10) << axis << ' ' << layer;
+      }
   }
 }
 
