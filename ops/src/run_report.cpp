@@ -2,6 +2,7 @@
 // What hybridize() measured, into the report.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "fibrolite/ops/text.h"
 #include "fibrolite/pieces.h"
@@ -87,6 +88,8 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
     row.mst_bridge_mm3 = row.bbox_bridge_mm3 = recipe.joint.layer_mm * joint.layer.bridge_area_mm2;
     (recipe.joint.bridge == Bridge::Mst ? row.bbox_bridge_mm3 : row.mst_bridge_mm3) =
         recipe.joint.layer_mm * joint.layer.other_bridge_area_mm2;
+    // A sleeve is a wall all round, whatever the rule for bridges.
+    if (row.radius_mm > 0) row.mst_bridge_mm3 = row.bbox_bridge_mm3 = std::numeric_limits<double>::quiet_NaN();
     row.layer_area_mm2 =
         joint.layer.pixel_mm * joint.layer.pixel_mm *
         static_cast<double>(std::count(joint.layer.solid.pixels.begin(), joint.layer.solid.pixels.end(), 1));

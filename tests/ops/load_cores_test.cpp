@@ -201,6 +201,8 @@ TEST(LoadCores, TheBundledBoxIsOnePieceWithNothingHanging) {
   EXPECT_LT(degrees(report.parts[1].axis, {0, 0, 1}), 3);
   ASSERT_EQ(report.interfaces.size(), 1U);
   EXPECT_GT(report.interfaces[0].radius_mm, 4);
+  EXPECT_TRUE(std::isnan(report.interfaces[0].mst_bridge_mm3)) << "a sleeve is no bridge by any rule";
+  EXPECT_TRUE(std::isnan(report.interfaces[0].bbox_bridge_mm3));
   EXPECT_EQ(report.interfaces[0].regions_after, 1);
   EXPECT_GT(report.interfaces[0].contact_area_mm2, 50);
   EXPECT_GT(report.interfaces[0].capacity_over_demand, 1);

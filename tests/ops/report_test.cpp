@@ -92,6 +92,21 @@ TEST(Report, ShapesOfValues) {
   EXPECT_EQ(json::parse(to_json(Report{}))["parts"], json::array());
 }
 
+TEST(Report, AMantleHasNoBridges) {
+  Report report = filled();
+  InterfaceReport& interface = report.interfaces.at(0);
+  interface.mst_bridge_mm3 = 1.5;
+  interface.bbox_bridge_mm3 = 4;
+  const json plane = json::parse(to_json(report))["interfaces"][0];
+  EXPECT_EQ(plane["border"], "plane");
+  EXPECT_EQ(plane["bridge_mm3"], json({{"mst", 1.5}, {"bbox", 4.0}}));
+  interface.radius_mm = 6;
+  interface.mst_bridge_mm3 = interface.bbox_bridge_mm3 = std::numeric_limits<double>::quiet_NaN();
+  const json mantle = json::parse(to_json(report))["interfaces"][0];
+  EXPECT_EQ(mantle["border"], "mantle");
+  EXPECT_EQ(mantle["bridge_mm3"], json({{"mst", nullptr}, {"bbox", nullptr}}));
+}
+
 TEST(Report, PrintChecksAreThereIfTheyWereMade) {
   Report report;
   EXPECT_FALSE(json::parse(to_json(report)).contains("print"));

@@ -34,7 +34,8 @@ struct InterfaceReport {
   double area_mm2 = 0;
   int regions_before = 0, regions_after = 0, columns = 0, columns_dropped = 0;
   double layer_area_mm2 = 0, union_area_mm2 = 0, bridge_area_mm2 = 0, contact_area_mm2 = 0;
-  double mst_bridge_mm3 = 0, bbox_bridge_mm3 = 0;  ///< Material of the bridges by either rule, whichever was used.
+  double mst_bridge_mm3 = 0, bbox_bridge_mm3 = 0;  ///< Material of the bridges by either rule, whichever was used; NaN:
+                                                   ///< a mantle, which has none.
   double shell_area_mm2 = 0;                       ///< Of the shell, which runs on through the section.
   double demand_n = 0;  ///< Integral over the section of the traction, everywhere of the load case that has most.
   double capacity_over_demand = 0;  ///< (contact_area + shell_area) * yield / demand; infinite without a demand.
