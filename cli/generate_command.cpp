@@ -166,6 +166,7 @@ void generate(const GenerateOptions& options) {
   SurfaceLayers layers({.voxel_mm = *params.voxel_mm}, {.axis = axis}, scratch);
   stage("surface", [&] { make_surface(hybrid, layers, report, context.part(0.8, 0.88, "surface")); });
   if (const auto& files = options.pictures.files; !files.empty()) {
+    note_colors(report);
     stage("picture", [&] {
       const Mesh mesh = gathered(layers, context.part(0.88, 0.88, "picture"));
       const PointColor color = colors(hybrid, params.recipe.shell.thickness_mm);

@@ -15,6 +15,7 @@
 #include "job.h"
 #include "options.h"
 #include "summary.h"
+#include "views.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -111,6 +112,7 @@ void run_partition(const PartitionOptions& options) {
   const FoundParts found = find_parts(model, recipe, report, context.part(0.1, 0.8, ""));
   const Partition parts = placed(found.partition, found.proxy.frame);
   fill_report(report, model, parts);
+  note_colors(report);
 
   // The parts are functions of space: they can be shown on a body as fine as is asked for.
   const double voxel = options.voxel_mm.value_or(found.proxy.solid.grid().voxel_mm);

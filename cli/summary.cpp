@@ -49,11 +49,16 @@ std::string joints_line(const std::vector<InterfaceReport>& interfaces) {
 
 std::string parts_table(const std::vector<PartReport>& parts) {
   if (parts.empty()) return {};
+  const bool coloured =
+      std::any_of(parts.begin(), parts.end(), [](const PartReport& part) { return !part.color_hex.empty(); });
   std::vector<Row> rows{{"part", "kind", "infill", "volume mm3", "filled", "fibres", "diameter mm", "reason"}};
-  for (const PartReport& part : parts)
+  if (coloured) rows.front().insert(rows.front().begin() + 2, "colour");
+  for (const PartReport& part : parts) {
     rows.push_back({std::to_string(part.id), part.kind, part.infill.empty() ? "-" : part.infill,
                     measured(part.volume_mm3), share(part.infill_volume_mm3, part.lumen_mm3),
                     part.fibres > 0 ? std::to_string(part.fibres) : "-", measured(part.diameter_mm, 3), part.reason});
+    if (coloured) rows.back().insert(rows.back().begin() + 2, part.color_name + " " + part.color_hex);
+  }
   return table(rows) + "\n";
 }
 

@@ -92,4 +92,12 @@ PictureParams picture_params(const std::string& text, const Hybrid& hybrid, cons
   return params;
 }
 
+void note_colors(Report& report) {
+  for (PartReport& part : report.parts) {
+    const bool column = part.kind == "column";
+    part.color_name = color_name(part.id, column);
+    part.color_hex = hex(part_color(part.id, column));
+  }
+}
+
 }  // namespace fibrolite::cli

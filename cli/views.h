@@ -29,4 +29,7 @@ void add_pictures(CLI::App& command, PictureOptions& options);
 /// @throws Error BadRecipe: there is no such part or joint.
 [[nodiscard]] PictureParams picture_params(const std::string& view, const Hybrid& hybrid, const Recipe& recipe);
 
+/// The legend of a run's pictures: the colour of each part, into the report.
+void note_colors(Report& report);
+
 }  // namespace fibrolite::cli

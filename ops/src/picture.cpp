@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "fibrolite/error.h"
@@ -35,6 +38,36 @@ int samples_per_pixel_edge(const PictureParams& params) {
   return pixels <= 2.1e6 ? 3 : pixels <= 4.5e6 ? 2 : 1;
 }
 
+struct Tone {
+  Rgb shade;
+  std::string name;
+};
+
+// From the palette of Okabe and Ito (2008), made for colour-blind readers: cool colours for columns, warm and earthen
+// ones for bulk. Its vermilion is left to the joints. When all are used they come once more, darker.
+Tone tone_of(int id, bool column) {
+  struct Named {
+    Rgb shade;
+    const char* name;
+  };
+  static constexpr std::array<Named, 5> columns{{{{0, 114, 178}, "blue"},
+                                                 {{86, 180, 233}, "sky blue"},
+                                                 {{0, 158, 115}, "green"},
+                                                 {{204, 121, 167}, "pink"},
+                                                 {{96, 96, 190}, "violet"}}};
+  static constexpr std::array<Named, 3> bulks{
+      {{{238, 196, 72}, "yellow"}, {{164, 140, 88}, "brown"}, {{196, 206, 110}, "lime"}}};
+  constexpr double darker = 0.6;
+  const auto pick = [id](const auto& list) -> Tone {
+    const int n = static_cast<int>(list.size()), place = ((id % (2 * n)) + 2 * n) % (2 * n);
+    const auto& [shade, name] = list[static_cast<std::size_t>(place % n)];
+    if (place < n) return {shade, name};
+    const auto less = [](std::uint8_t channel) { return static_cast<std::uint8_t>(darker * channel); };
+    return {{less(shade.r), less(shade.g), less(shade.b)}, std::string("dark ") + name};
+  };
+  return column ? pick(columns) : pick(bulks);
+}
+
 }  // namespace
 
 RgbImage picture(const Mesh& surface, const Solid& solid, const PointColor& color, const PictureParams& params,
@@ -62,17 +95,18 @@ void write_png(const std::filesystem::path& path, const RgbImage& image) {
                  {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 
-// From the palette of Okabe and Ito (2008), made for colour-blind readers: cool colours for columns, warm and earthen
-// ones for bulk. Its vermilion is left to the joints.
-Rgb part_color(int id, bool column) {
-  static constexpr std::array<Rgb, 5> columns{
-      {{0, 114, 178}, {86, 180, 233}, {0, 158, 115}, {204, 121, 167}, {96, 96, 190}}};
-  static constexpr std::array<Rgb, 3> bulks{{{238, 196, 72}, {164, 140, 88}, {196, 206, 110}}};
-  const auto pick = [id](const auto& list) {
-    const int n = static_cast<int>(list.size());
-    return list[static_cast<std::size_t>(((id % n) + n) % n)];
-  };
-  return column ? pick(columns) : pick(bulks);
+Rgb part_color(int id, bool column) { return tone_of(id, column).shade; }
+
+std::string color_name(int id, bool column) { return tone_of(id, column).name; }
+
+std::string hex(Rgb color) {
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string text = "#";
+  for (const std::uint8_t channel : {color.r, color.g, color.b}) {
+    text += digits[channel / 16];
+    text += digits[channel % 16];
+  }
+  return text;
 }
 
 }  // namespace fibrolite

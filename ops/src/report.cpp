@@ -53,6 +53,12 @@ Json fibres_of(const PartReport& part) {
             {"porosity", section.porosity}}}};
 }
 
+/// null where nothing was coloured.
+Json color_of(const PartReport& part) {
+  if (part.color_hex.empty()) return nullptr;
+  return {{"name", part.color_name}, {"hex", part.color_hex}};
+}
+
 Json to_json(const PartReport& part) {
   const Json stress = {{"axial", part.stress.axial},
                        {"transverse", {part.stress.transverse[0], part.stress.transverse[1]}},
@@ -62,6 +68,7 @@ Json to_json(const PartReport& part) {
           {"candidates", part.candidates},
           {"kind", part.kind},
           {"infill", part.infill},
+          {"color", color_of(part)},
           {"volume_mm3", part.volume_mm3},
           {"lumen_mm3", part.lumen_mm3},
           {"infill_volume_mm3", part.infill_volume_mm3},

@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 
 #include "fibrolite/mesh_io.h"
+#include "fibrolite/ops/picture.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite_program.h"
 #include "mesh_checks.h"
@@ -67,6 +70,7 @@ TEST(Generate, EveryFormatHoldsTheSameSoundMesh) {
   EXPECT_THAT(names_in(folder.path()),
               ElementsAre("a.3mf", "a.obj", "a.ply", "a.png", "a.report.json", "a.stl", "a.vdb"));
   const json report = report_in(folder / "a.report.json");
+  EXPECT_EQ(report["parts"][0]["color"]["name"], "yellow") << "in its picture";
   const double volume = report["mesh"]["volume_mm3"];
   for (const char* name : {"a.stl", "a.obj", "a.ply", "a.3mf"}) expect_sound(folder / name, volume);
 
@@ -366,6 +370,30 @@ TEST(Partition, PartsInColourAsGridsAndInTheReport) {
   EXPECT_NEAR(volume, report["model"]["volume_mm3"].get<double>(), 0.03 * volume);
   EXPECT_THAT(content(folder / "p.ply").substr(0, 600), HasSubstr("red"));
   EXPECT_THAT(finished.out, HasSubstr("column"));
+}
+
+/// The legend: what has a part's colour in the picture lies on that part's own grid, and nothing else has it.
+TEST(Partition, SaysWhichColourIsWhichPart) {
+  const TempDir folder;
+  const Finished finished =
+      run({"partition", asset("quadruped"), "--size", "100", "-o", folder / "p.ply", "-o", folder / "p.vdb"});
+  const json parts = report_in(folder / "p.report.json")["parts"];
+  const Mesh mesh = read_mesh(folder / "p.ply").mesh;
+  ASSERT_EQ(mesh.triangle_colors.size(), mesh.triangles.size());
+  std::map<std::string, std::vector<Vec3d>> middles;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Vec3d sum{};
+    for (const std::uint32_t corner : mesh.triangles[t]) sum = sum + to_double(mesh.vertices[corner]);
+    middles[hex(mesh.triangle_colors[t])].push_back(sum / 3);
+  }
+  EXPECT_EQ(middles.size(), parts.size());
+  for (const json& part : parts) {
+    const std::string name = part["color"]["name"], code = part["color"]["hex"];
+    EXPECT_THAT(finished.out, HasSubstr(name + " " + code));
+    ASSERT_TRUE(middles.contains(code)) << part["id"] << " is " << code;
+    const Solid grid = read_vdb(folder / "p.vdb", "part_" + std::to_string(part["id"].get<int>()));
+    for (const Vec3d p : middles.at(code)) ASSERT_LT(std::abs(grid.distance(p)), 2 * grid.grid().voxel_mm) << code;
+  }
 }
 
 TEST(Verify, StressesForParaViewAndADeckForCalculix) {

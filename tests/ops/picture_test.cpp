@@ -11,6 +11,7 @@
 #include <iterator>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "fibrolite/error.h"
 #include "fibrolite/realize.h"
@@ -210,6 +211,28 @@ TEST(PartColor, NeighboursDifferClearly) {
     EXPECT_TRUE(far(part_color(id, false), joint_color)) << id;
     for (int other = 0; other < 3; ++other) EXPECT_TRUE(far(part_color(id, true), part_color(other, false)));
   }
+}
+
+/// A legend names each colour once: none of them is another's, nor near it.
+TEST(PartColor, ALegendOfTenColumnsAndSixBulksIsUnambiguous) {
+  struct Entry {
+    Rgb color;
+    std::string name;
+  };
+  std::vector<Entry> entries;
+  for (int id = 0; id < 10; ++id) entries.push_back({part_color(id, true), color_name(id, true)});
+  for (int id = 0; id < 6; ++id) entries.push_back({part_color(id, false), color_name(id, false)});
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Rgb a = entries[i].color, b = entries[j].color;
+      EXPECT_GT(std::abs(a.r - b.r) + std::abs(a.g - b.g) + std::abs(a.b - b.b), 50) << i << ' ' << j;
+      EXPECT_NE(entries[i].name, entries[j].name);
+    }
+  EXPECT_EQ(hex(part_color(0, true)), "#0072b2");
+  EXPECT_EQ(color_name(0, true), "blue");
+  EXPECT_EQ(color_name(6, true), "dark sky blue");
+  EXPECT_EQ(hex(Rgb{0, 10, 255}), "#000aff");
+  EXPECT_EQ(part_color(10, true), part_color(0, true));
 }
 
 }  // namespace

@@ -85,6 +85,11 @@ TEST(Report, ShapesOfValues) {
             json({{"fibres", 19}, {"mean_area_mm2", 3.5}, {"membrane_mm", 0.81}, {"porosity", 0.5}}));
   EXPECT_EQ(report["parts"][0]["mfs"]["template"],
             json({{"fibres", 724}, {"mean_area_px2", 978.0}, {"membrane_px", 5.0}, {"porosity", 0.7}}));
+  EXPECT_TRUE(report["parts"][0]["color"].is_null()) << "there is no picture";
+  Report drawn = filled();
+  drawn.parts[0].color_name = "sky blue";
+  drawn.parts[0].color_hex = "#56b4e9";
+  EXPECT_EQ(json::parse(to_json(drawn))["parts"][0]["color"], json({{"name", "sky blue"}, {"hex", "#56b4e9"}}));
   EXPECT_EQ(report["interfaces"][0]["parts"], json({3, 0}));
   EXPECT_EQ(report["verification"]["selected"][0]["case"], "pressed");
   EXPECT_EQ(report["verification"]["selected"][0]["area_mm2"], 12.5);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "fibrolite/context.h"
 #include "fibrolite/image.h"
@@ -37,8 +38,13 @@ using PointColor = std::function<Rgb(Vec3d)>;
 /// PNG, whole or absent. @throws Error Io.
 void write_png(const std::filesystem::path& path, const RgbImage& image);
 
-/// Distinct, print-friendly colours for part ids; shell and joint have their own.
+/// Distinct, print-friendly colours for part ids: ten for columns, six for bulk, then they come again; shell and joint
+/// have their own.
 [[nodiscard]] Rgb part_color(int id, bool column);
+/// What to call it, for a legend: "sky blue", "dark yellow". Different for each of the ten and the six.
+[[nodiscard]] std::string color_name(int id, bool column);
+/// "#0072b2".
+[[nodiscard]] std::string hex(Rgb color);
 inline constexpr Rgb shell_color{214, 210, 202};
 inline constexpr Rgb joint_color{236, 112, 20};
 

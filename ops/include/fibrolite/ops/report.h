@@ -26,6 +26,7 @@ struct PartReport {
   double diameter_mm = 0;
   PartStress stress;
   std::string reason;
+  std::string color_name, color_hex;  ///< In the pictures of the run; empty: there is none.
 };
 struct InterfaceReport {
   int a = 0, b = 0;
