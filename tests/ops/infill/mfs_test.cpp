@@ -6,10 +6,13 @@
 
 #include <cmath>
 #include <fstream>
+#include <numbers>
+#include <vector>
 
 #include "discs.h"
 #include "fibrolite/error.h"
 #include "fibrolite/random.h"
+#include "infill/census.h"
 #include "micrographs.h"
 #include "models.h"
 #include "part_maker.h"
@@ -110,6 +113,81 @@ TEST(Mfs, ATaperKeepsFibresInANarrowingLimb) {
     EXPECT_TRUE(section.walls_hold(0.8 - 0.03, 1.2)) << z;
     EXPECT_TRUE(section.gaps_hold(0.4 - 0.03, 1.2)) << z;
   }
+}
+
+/// A quarter of a ring, as thick as a limb, and nine sections from end to end of it.
+struct BentLimb {
+  static constexpr double ring = 30, thick = 9, pixel = 0.1;
+  static constexpr int sections = 9;
+  MfsParams params;
+  Shape body = intersect({torus({}, ring, thick), half_space({}, {-1, 0, 0}), half_space({}, {0, -1, 0})});
+  Shape lumen = offset(body, -1.0);
+  Fill fill;
+
+  explicit BentLimb(double fibre_mm) {
+    params.fibre_mm = fibre_mm;
+    std::vector<Vec3d> line;
+    for (int i = 0; i <= 60; ++i) line.push_back(on_line(std::numbers::pi / 2 * i / 60));
+    fill =
+        generate(column({{0, 0, -thick}, {ring + thick, ring + thick, thick}}, Axis::along(line)), params, body, 1.0);
+  }
+  static Vec3d on_line(double a) { return {ring * std::cos(a), ring * std::sin(a), 0}; }
+  [[nodiscard]] static PlaneGrid grid_at(int section) {
+    const double a = 0.06 + (std::numbers::pi / 2 - 0.12) * section / (sections - 1);
+    return PlaneGrid::about(frame_along(on_line(a), {-std::sin(a), std::cos(a), 0}), thick, pixel, 2);
+  }
+  [[nodiscard]] int ends_at(const Shape& membranes, int section) const {
+    const PlaneGrid grid = grid_at(section);
+    return count_free_edges(sample(membranes, grid), sample(lumen, grid), params.wall_mm, pixel);
+  }
+  [[nodiscard]] int fibres_at(int section) const {
+    const PlaneGrid grid = grid_at(section);
+    const FloatImage inside = sample(lumen, grid);
+    return census(sample(fill.shape, grid), pixel, 0.25 * params.wall_mm * params.wall_mm, &inside).fibres;
+  }
+};
+
+TEST(Mfs, NoMembraneOfABentLimbEndsInAVoidAnywhereAlongIt) {
+  for (const double fibre_mm : {2.4, 6.0}) {
+    const BentLimb limb(fibre_mm);
+    EXPECT_EQ(limb.fill.free_edges, 0);
+    EXPECT_GT(limb.fill.fibres, 0.8 * std::numbers::pi * 8 * 8 / (fibre_mm * fibre_mm));
+    for (int k = 0; k < BentLimb::sections; ++k) {
+      EXPECT_EQ(limb.ends_at(limb.fill.shape, k), 0) << k;
+      EXPECT_NEAR(limb.fibres_at(k), limb.fill.fibres, 1) << k;
+    }
+  }
+}
+
+/// The longest wall near the middle of the second section, cut open to a gap of 0.6 mm with round ends on either side,
+/// for 1.2 mm along the limb: found there, and in no other section, nor in the middle one that the report looks at.
+TEST(Mfs, AMembraneCutOpenAnywhereAlongABentLimbIsFound) {
+  const BentLimb limb(6);
+  const double wall = limb.params.wall_mm, reach = 1.1;
+  const PlaneGrid second = BentLimb::grid_at(1);
+  const auto depth = [&](double u, double v) { return -limb.fill.shape(second.frame.to_world({u, v, 0})); };
+  double best = 0, u = 0, v = 0, way = 0;
+  for (double x = -4; x < 4; x += 0.1)
+    for (double y = -4; y < 4; y += 0.1) {
+      if (depth(x, y) > 0.55 * wall) continue;  // a junction
+      for (double turn = 0; turn < std::numbers::pi; turn += 0.1) {
+        const double dx = reach * std::cos(turn), dy = reach * std::sin(turn);
+        const double least = std::min({depth(x, y), depth(x + dx, y + dy), depth(x - dx, y - dy)});
+        if (least <= best) continue;
+        best = least;
+        u = x, v = y, way = turn;
+      }
+    }
+  ASSERT_GT(best, 0.4 * wall);
+  Frame at = second.frame;
+  at.origin = second.frame.to_world({u, v, 0});
+  at.x = std::cos(way) * second.frame.x + std::sin(way) * second.frame.y;
+  at.y = cross(at.z, at.x);
+  const double end = 0.3 + 0.5 * wall;
+  const auto rim = [&](double side) { return capsule({side * end, 0, -0.6}, {side * end, 0, 0.6}, 0.5 * wall); };
+  const Shape gap = placed(cuboid({{-end, -1.5, -0.6}, {end, 1.5, 0.6}}), at);
+  const Shape torn = unite({subtract(limb.fill.shape, gap), placed(unite({rim(-1), rim(1)}), at)});
+  for (int k = 0; k < BentLimb::sections; ++k) EXPECT_EQ(limb.ends_at(torn, k), k == 1 ? 2 : 0) << k;
 }
 
 TEST(Mfs, ATaperChangesNothingInAnEvenLimb) {
