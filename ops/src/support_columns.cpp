@@ -136,6 +136,7 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
 
   std::vector<Vec2d> darts = under_crystal(feet, below, layer.pixel_mm, params.column_mm);
   for (std::size_t i = darts.size(); i > 1; --i) std::swap(darts[i - 1], darts[random.below(i)]);
+  // Half a stick's radius deep: a whole radius is its axis alone, which a ray meets only by chance.
   const auto top = climb(crystal, frame, rays_from(darts), -stick_mm / 4, face + params.reach_mm, step, context);
   // Inside the shell a column would add nothing; climbing the complement finds where one would leave the lumen.
   const auto exit = climb(complement(lumen), frame, rays_from(darts), 0, face + params.reach_mm, step, context);
