@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "discs.h"
 #include "fibrolite/ops/infill/mfs.h"
@@ -261,6 +262,45 @@ TEST(Sweep, ADistanceWithinFivePercent) {
     EXPECT_GE(bent.flattest_at_surface, 0.9) << ring;
   }
   EXPECT_LE(sweep(muscle(), arc(25)).lipschitz(), 1.05);
+}
+
+/// Triangles between the same fibres, straight and bent.
+TEST(Sweep, ADistanceWithinFivePercentBetweenDelaunayWallsToo) {
+  MembraneParams params;
+  params.width_mm = params.height_mm = 30;
+  params.walls = Walls::Delaunay;
+  params.fibre_mm = 4.15;
+  const MembraneImage triangles = synthesize(find_fibres(read_gray(bundled_micrograph())), params);
+  const Slopes along_line = slopes(sweep(triangles, Axis::straight({0, 0, 0}, {0, 0, 30})), [](Random& random) {
+    return Vec3d{20 * random.uniform() - 10, 20 * random.uniform() - 10, 30 * random.uniform()};
+  });
+  EXPECT_LE(along_line.steepest, 1.05);
+  EXPECT_GE(along_line.flattest_at_surface, 0.9);
+  const Shape swept = sweep(triangles, arc(25));
+  const Slopes bent = slopes(swept, [](Random& random) { return about_arc(random, 25, 8); });
+  EXPECT_LE(bent.steepest, 1.05);
+  EXPECT_GE(bent.flattest_at_surface, 0.9);
+  EXPECT_LE(swept.lipschitz(), 1.05);
+}
+
+/// A ring bent out of its plane: its frame comes back turned, and is turned back along the way.
+TEST(Sweep, ADistanceWithinFivePercentAroundATwistedRing) {
+  const auto line = [](double a) {
+    return Vec3d{20 * std::cos(a), 20 * std::sin(a), 6 * std::sin(2 * a) + 3 * std::cos(a)};
+  };
+  std::vector<Vec3d> points;
+  constexpr int count = 180;
+  for (int i = 0; i <= count; ++i) points.push_back(line(2 * pi * (i % count) / count));
+  const Axis axis = Axis::along(points);
+  ASSERT_GT(std::abs(Sweep(axis).twist_per_mm()), 0) << "or it is no test of a twist";
+  const Shape ring = sweep(muscle(), axis);
+  EXPECT_LE(ring.lipschitz(), 1.05);
+  const Slopes found = slopes(ring, [&](Random& random) {
+    const double a = 2 * pi * random.uniform(), r = 6 * std::sqrt(random.uniform()), turn = 2 * pi * random.uniform();
+    return frame_along(line(a), line(a + 1e-4) - line(a - 1e-4)).to_world({r * std::cos(turn), r * std::sin(turn), 0});
+  });
+  EXPECT_LE(found.steepest, 1.05);
+  EXPECT_GE(found.flattest_at_surface, 0.9);
 }
 
 /// Samples of the inside of a bent tube, h apart along its section and its line: regions of void and of wall in space.
