@@ -301,9 +301,8 @@ SliceFormat slice_format(const std::filesystem::path& path) {
 }
 
 int most_layers(SliceFormat format) {
-  // A zip without extensions numbers its entries with 16 bits; two are for what is said about the layers.
-  const bool entries = format == SliceFormat::PngZip || format == SliceFormat::Sl1 || format == SliceFormat::SvgZip;
-  return entries ? 65535 - 2 : 1 << 24;
+  // Printers that read .sl1 number its entries with 16 bits; two are for what is said about the layers.
+  return format == SliceFormat::Sl1 ? 65535 - 2 : 1 << 24;
 }
 
 std::unique_ptr<LayerFormat> make_format(SliceFormat format, const SliceJob& job, OutputFile& file) {

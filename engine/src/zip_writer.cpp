@@ -13,8 +13,10 @@
 namespace fibrolite {
 namespace {
 
-constexpr std::uint32_t local_signature = 0x04034b50, directory_signature = 0x02014b50, end_signature = 0x06054b50;
-constexpr std::uint16_t version = 20, method_store = 0, method_deflate = 8;
+constexpr std::uint32_t local_signature = 0x04034b50, directory_signature = 0x02014b50, end_signature = 0x06054b50,
+                        end64_signature = 0x06064b50, locator_signature = 0x07064b50;
+constexpr std::uint16_t version = 20, version64 = 45, method_store = 0, method_deflate = 8;
+constexpr std::uint32_t in_zip64 = 0xFFFFFFFF;  ///< The field is too short: see there.
 constexpr std::uint16_t time = 0, date = 0x21;  // 1980-01-01 00:00, the earliest a zip can say
 // Twice the speed of the default for a twentieth more bytes on this kind of text.
 constexpr int level = 4;
@@ -23,7 +25,7 @@ constexpr std::string_view end_of_stream{"\x03\x00", 2};
 
 std::uint32_t narrow(std::uint64_t value) {
   if (value >= std::numeric_limits<std::uint32_t>::max())
-    throw Error(Code::TooLarge, "the archive would be larger than 4 GB", "",
+    throw Error(Code::TooLarge, "an entry of the archive would be larger than 4 GB", "",
                 "write another format, or use larger voxels or pixels");
   return static_cast<std::uint32_t>(value);
 }
@@ -68,9 +70,9 @@ void ZipWriter::Entry::count(const DeflatedPiece& piece) {
   static_cast<void>(narrow(raw_size));
 }
 
-std::string ZipWriter::Entry::fields() const {
+std::string ZipWriter::Entry::fields(bool zip64) const {
   std::string text;
-  append_bytes(text, version);
+  append_bytes(text, zip64 ? version64 : version);
   append_bytes(text, std::uint16_t{0});  // flags
   append_bytes(text, method);
   append_bytes(text, time);
@@ -79,7 +81,6 @@ std::string ZipWriter::Entry::fields() const {
   append_bytes(text, narrow(size));
   append_bytes(text, narrow(raw_size));
   append_bytes(text, static_cast<std::uint16_t>(name.size()));
-  append_bytes(text, std::uint16_t{0});  // extra field
   return text;
 }
 
@@ -104,7 +105,7 @@ void ZipWriter::append(const DeflatedPiece& piece) {
 
 void ZipWriter::close() {
   file_->write(end_of_stream);
-  const std::string fields = open_.fields();
+  const std::string fields = open_.fields(false);
   file_->overwrite(offset_ + sizeof local_signature, std::as_bytes(std::span(fields)));
   end(open_);
 }
@@ -118,33 +119,57 @@ void ZipWriter::add_stored(const std::string& name, const DeflatedPiece& piece) 
 }
 
 void ZipWriter::begin(const Entry& entry) {
-  if (entries_ == std::numeric_limits<std::uint16_t>::max())
-    throw Error(Code::TooLarge, "the archive would have more than 65535 entries");
   std::string header;
   append_bytes(header, local_signature);
-  file_->write(header + entry.fields() + entry.name);
+  header += entry.fields(false);
+  append_bytes(header, std::uint16_t{0});  // extra field
+  file_->write(header + entry.name);
 }
 
 void ZipWriter::end(const Entry& entry) {
-  const std::string fields = entry.fields();
+  const bool far = offset_ > most_;
   append_bytes(directory_, directory_signature);
-  append_bytes(directory_, version);
-  directory_ += fields;
-  directory_.append(10, '\0');  // comment size, disk, attributes
-  append_bytes(directory_, narrow(offset_));
+  append_bytes(directory_, far ? version64 : version);  // made by
+  directory_ += entry.fields(far);
+  append_bytes(directory_, static_cast<std::uint16_t>(far ? 12 : 0));  // extra field
+  directory_.append(10, '\0');                                         // comment size, disk, attributes
+  append_bytes(directory_, far ? in_zip64 : static_cast<std::uint32_t>(offset_));
   directory_ += entry.name;
+  if (far) {
+    append_bytes(directory_, std::uint16_t{1});
+    append_bytes(directory_, std::uint16_t{8});
+    append_bytes(directory_, offset_);
+  }
   ++entries_;
-  offset_ += sizeof local_signature + fields.size() + entry.name.size() + entry.size;
+  offset_ += sizeof local_signature + entry.fields(false).size() + 2 + entry.name.size() + entry.size;
 }
 
 void ZipWriter::finish() {
+  constexpr std::uint16_t many = std::numeric_limits<std::uint16_t>::max();
   std::string end;
+  const bool zip64 = entries_ >= many || offset_ > most_ || directory_.size() > most_;
+  if (zip64) {
+    append_bytes(end, end64_signature);
+    append_bytes(end, std::uint64_t{44});  // of this record, what follows
+    append_bytes(end, version64);
+    append_bytes(end, version64);
+    append_bytes(end, std::uint64_t{0});  // disks
+    append_bytes(end, entries_);
+    append_bytes(end, entries_);
+    append_bytes(end, std::uint64_t{directory_.size()});
+    append_bytes(end, offset_);
+    append_bytes(end, locator_signature);
+    append_bytes(end, std::uint32_t{0});  // disk
+    append_bytes(end, offset_ + directory_.size());
+    append_bytes(end, std::uint32_t{1});  // disks
+  }
   append_bytes(end, end_signature);
   append_bytes(end, std::uint32_t{0});  // disks
-  append_bytes(end, entries_);
-  append_bytes(end, entries_);
-  append_bytes(end, narrow(directory_.size()));
-  append_bytes(end, narrow(offset_));
+  const auto count = zip64 ? many : static_cast<std::uint16_t>(entries_);
+  append_bytes(end, count);
+  append_bytes(end, count);
+  append_bytes(end, zip64 ? in_zip64 : static_cast<std::uint32_t>(directory_.size()));
+  append_bytes(end, zip64 ? in_zip64 : static_cast<std::uint32_t>(offset_));
   append_bytes(end, std::uint16_t{0});  // comment size
   file_->write(directory_);
   file_->write(end);

@@ -22,12 +22,14 @@ DeflatedPiece deflate_piece(std::string_view text);
 /// As it is: for what is compressed already.
 DeflatedPiece stored_piece(std::string bytes);
 
-/// Why not libzip: it deflates on one thread and needs the whole text at once; a 3MF of 12 million triangles is 0.9 GB
-/// of text.
+/// What passes 4 GB or 65535 entries is written as zip64 (APPNOTE 6.3.10, 4.3.14 and 4.5.3), any other archive without
+/// a trace of it; one entry stays below 4 GB. Why not libzip: it deflates on one thread and needs the whole text at
+/// once; a 3MF of 12 million triangles is 0.9 GB of text.
 class ZipWriter {
  public:
-  explicit ZipWriter(OutputFile& file) : file_(&file) {}
-  /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB, or 65536 entries.
+  /// `most`: beyond it a place in the file is written as zip64 (lower for tests alone).
+  explicit ZipWriter(OutputFile& file, std::uint64_t most = 0xFFFFFFFE) : file_(&file), most_(most) {}
+  /// The pieces, in order, as one entry. @throws Error TooLarge: 4 GB.
   void add(const std::string& name, const std::vector<DeflatedPiece>& pieces);
   void add(const std::string& name, std::string_view text) { add(name, {deflate_piece(text)}); }
   /// The same piece by piece, for an entry that need not be in memory.
@@ -47,16 +49,15 @@ class ZipWriter {
     std::uint64_t size = 0, raw_size = 0;
 
     void count(const DeflatedPiece& piece);
-    /// What the local header and the directory share. @throws Error TooLarge.
-    [[nodiscard]] std::string fields() const;
+    /// What the local header and the directory share, up to the name's length. @throws Error TooLarge.
+    [[nodiscard]] std::string fields(bool zip64) const;
   };
   void begin(const Entry& entry);
   void end(const Entry& entry);
   OutputFile* file_;
   Entry open_;
-  std::uint64_t offset_ = 0;
+  std::uint64_t most_, offset_ = 0, entries_ = 0;
   std::string directory_;
-  std::uint16_t entries_ = 0;
 };
 
 }  // namespace fibrolite

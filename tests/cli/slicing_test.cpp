@@ -170,7 +170,7 @@ TEST_F(SlicingRefused, APrinterSmallerThanThePart) {
   EXPECT_THAT(refused({"--printer", "15x30x30:150x300", "--tile"}, Usage, "out.sl1"), HasSubstr("use .zip"));
 }
 TEST_F(SlicingRefused, MoreThanTheFormatHolds) {
-  EXPECT_THAT(refused({"--layer", "0.0003"}, OutOfMemory), HasSubstr("66667 layers"));
+  EXPECT_THAT(refused({"--layer", "0.0003"}, OutOfMemory, "out.sl1"), HasSubstr("66667 layers"));
   EXPECT_THAT(refused({"--layer", "1e-9"}, OutOfMemory), HasSubstr("layer"));
   EXPECT_THAT(refused({"--pixel", "1e-4"}, OutOfMemory), HasSubstr("pixel"));
   EXPECT_THAT(refused({"--pixel", "0.001", "--max-memory", "300M"}, OutOfMemory), HasSubstr("20000 x 20000 pixels"));

@@ -268,6 +268,8 @@ TEST(SliceIo, RefusesWhatTheFormatCannotHold) {
   const TempDir folder;
   SliceJob tall = job();
   tall.plates[0].grid.layers = 70000;
+  EXPECT_THROW(write(folder / "a.sl1", tall), Error);
+  tall.plates[0].grid.layers = (1 << 24) + 1;
   for (const char* name : {"a.zip", "a.sl1", "a.svg.zip"}) EXPECT_THROW(write(folder / name, tall), Error);
   EXPECT_THROW(write(folder / "a.gif", job()), Error);
   EXPECT_THROW(write(folder / "nowhere" / "a.zip", job()), Error);

@@ -21,6 +21,9 @@ inline std::uint32_t little(std::string_view bytes, std::size_t at, int count) {
     value = value << 8 | static_cast<unsigned char>(bytes.at(at + static_cast<std::size_t>(i)));
   return value;
 }
+inline std::uint64_t little64(std::string_view bytes, std::size_t at) {
+  return little(bytes, at, 4) | std::uint64_t{little(bytes, at + 4, 4)} << 32;
+}
 inline std::uint32_t big(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes.at(at + i));
@@ -42,17 +45,30 @@ inline std::string inflated(std::string_view bytes, std::size_t size, int window
   return out;
 }
 
-/// Entries by name, checked against their sums.
+/// Entries by name, checked against their sums. Of zip64 what concerns many entries, and far ones.
 inline std::map<std::string, std::string> unzipped(std::string_view zip) {
   std::map<std::string, std::string> entries;
   const std::size_t end = zip.size() - 22;
   if (little(zip, end, 4) != 0x06054b50) throw std::runtime_error("no end of directory");
   std::size_t at = little(zip, end + 16, 4);
-  for (std::uint32_t n = little(zip, end + 10, 2); n > 0; --n) {
+  std::uint64_t n = little(zip, end + 10, 2);
+  if (at == 0xFFFFFFFF) {
+    if (little(zip, end - 20, 4) != 0x07064b50) throw std::runtime_error("no locator of zip64");
+    const std::size_t end64 = little64(zip, end - 20 + 8);
+    if (little(zip, end64, 4) != 0x06064b50) throw std::runtime_error("no end of directory of zip64");
+    n = little64(zip, end64 + 32);
+    at = little64(zip, end64 + 48);
+  }
+  for (; n > 0; --n) {
     if (little(zip, at, 4) != 0x02014b50) throw std::runtime_error("no entry in the directory");
     const std::uint32_t method = little(zip, at + 10, 2), crc = little(zip, at + 16, 4), size = little(zip, at + 20, 4),
                         raw = little(zip, at + 24, 4), name_size = little(zip, at + 28, 2),
-                        offset = little(zip, at + 42, 4);
+                        extra_size = little(zip, at + 30, 2);
+    std::size_t offset = little(zip, at + 42, 4);
+    if (offset == 0xFFFFFFFF) {
+      if (little(zip, at + 46 + name_size, 4) != 0x00080001) throw std::runtime_error("no place of zip64");
+      offset = little64(zip, at + 46 + name_size + 4);
+    }
     const std::string name(zip.substr(at + 46, name_size));
     if (zip.substr(offset + 30, name_size) != name) throw std::runtime_error("the local header has another name");
     const std::string_view data = zip.substr(offset + 30 + name_size, size);
@@ -60,7 +76,7 @@ inline std::map<std::string, std::string> unzipped(std::string_view zip) {
     if (crc32_z(0, reinterpret_cast<const Bytef*>(text.data()), text.size()) != crc || text.size() != raw)
       throw std::runtime_error("wrong sum of " + name);
     entries[name] = std::move(text);
-    at += 46 + name_size;
+    at += 46 + name_size + extra_size;
   }
   return entries;
 }
