@@ -2,6 +2,7 @@
 // What the program must hold on real models: one line per requirement, with the number measured and ok or FAIL. Minutes
 // to run, so not a ctest:  acceptance MODELS_FOLDER [WORK_FOLDER [SECTION...]]; rotations:MODEL is that model alone
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -54,6 +55,19 @@ struct Table {
       return {};
     }
     return json::parse(content(work / (name + ".report.json")));
+  }
+  /// Runs `verify --solid` and gives the report; empty if it failed.
+  json verify(const std::string& name, const fs::path& model, const std::vector<std::string>& options) {
+    const fs::path report = work / (name + ".report.json");
+    std::vector<std::string> arguments{"verify", model,         "-o",     work / (name + ".vtu"), "--solid", "--report",
+                                       report,   "--overwrite", "--quiet"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const Finished run = run_program(FIBROLITE_PROGRAM, arguments);
+    if (run.code != 0) {
+      row(name + ": exit code", std::to_string(run.code) + "  " + run.err.substr(0, run.err.find('\n')), false);
+      return {};
+    }
+    return json::parse(content(report));
   }
 };
 
@@ -307,7 +321,8 @@ void rotations(Table& table) {
   for (const char* file : {"horse.ply", "armadillo.obj", "hand.obj", "spot.obj", "rocker-arm.obj", "fertility.off",
                            "monkey.obj", "bunny-open.obj"})
     files.push_back(table.models / file);
-  for (const char* name : {"molar", "quadruped", "torus", "y", "bent_tube", "figure", "bracket", "cylinder_on_box"})
+  for (const char* name :
+       {"molar", "quadruped", "torus", "y", "bent_tube", "figure", "bracket", "cylinder_on_box", "rounded_box"})
     files.push_back(asset(name));
   std::uint64_t id = 0;
   for (const fs::path& file : files) {
@@ -397,17 +412,10 @@ void shifts(Table& table) {
   std::vector<double> volume, compliance;
   for (const char* shift : {"[0,0,0]", "[1.5,0,0]", "[0,1.5,3]", "[2,1,0.7]"}) {
     const std::string name = "monkey-shift-" + std::to_string(volume.size());
-    const fs::path report_file = table.work / (name + ".report.json");
-    const Finished run =
-        run_program(FIBROLITE_PROGRAM,
-                    {"verify", table.models / "monkey.obj", "-o", table.work / (name + ".vtu"), "--solid", "--size",
-                     "60", "--voxel", "0.3", "--infill", "tcs", "--set", std::string("tcs.shift_mm=") + shift, "--set",
-                     "loads=paper-compare", "--report", report_file, "--overwrite", "--quiet"});
-    const json report = json::parse(content(report_file), nullptr, false);
-    if (run.code != 0 || report.is_discarded()) {
-      table.row(name + ": exit code", std::to_string(run.code) + "  " + run.err.substr(0, run.err.find('\n')), false);
-      return;
-    }
+    const json report = table.verify(name, table.models / "monkey.obj",
+                                     {"--size", "60", "--voxel", "0.3", "--infill", "tcs", "--set",
+                                      std::string("tcs.shift_mm=") + shift, "--set", "loads=paper-compare"});
+    if (report.is_null()) return;
     table.equal(name + ": pieces of material", report["solid"]["pieces"], 1);
     volume.push_back(number(report["solid"]["volume_mm3"]));
     compliance.push_back(number(report["strength"][0]["compliance_nmm"]));
@@ -420,9 +428,41 @@ void shifts(Table& table) {
   table.row("monkey, four shifts: largest compliance / smallest - 1", spread(compliance), 0, 0.05);
 }
 
+/// Fibres under a patch of load, beside others of the same mass.
+void patch(Table& table) {
+  struct Rival {
+    const char* name;
+    std::vector<std::string> options;
+  };
+  const std::vector<Rival> all{{"hybrid", {}},
+                               {"gyroid", {"--infill", "gyroid"}},
+                               {"sheet", {"--infill", "tcs", "--set", "tcs.cell_mm=13.4"}},
+                               {"shell", {"--infill", "shell", "--set", "shell.thickness_mm=2.16"}}};
+  std::map<std::string, std::array<double, 3>> measured;  // mass, loads from above and from the side
+  for (const Rival& rival : all) {
+    std::vector<std::string> options{"--size", "40",       "--voxel",
+                                     "0.3",    "--recipe", fs::path(FIBROLITE_ASSETS) / "recipes" / "patch.json"};
+    options.insert(options.end(), rival.options.begin(), rival.options.end());
+    const json report = table.verify(std::string("patch-") + rival.name, asset("rounded_box"), options);
+    if (report.is_null()) return;
+    measured[rival.name] = {number(report["solid"]["mass_g"]), number(report["strength"][0]["failure_load_n"]),
+                            number(report["strength"][1]["failure_load_n"])};
+  }
+  const auto& [mass, above, beside] = measured["gyroid"];
+  for (const Rival& rival : all) {
+    const auto& [own_mass, own_above, own_beside] = measured[rival.name];
+    const bool hybrid = std::string(rival.name) == "hybrid";
+    const std::string name = std::string("patch, ") + rival.name;
+    table.row(name + ": mass / gyroid's", own_mass / mass, 0.99, 1.01);
+    table.row(name + ": patch on top / gyroid's", own_above / above, hybrid ? 1.4 : 0, 1e9);
+    table.row(name + ": patch on a side / gyroid's", own_beside / beside, hybrid ? 0.9 : 0, 1e9);
+  }
+}
+
 const std::vector<std::pair<std::string, std::function<void(Table&)>>> sections{
-    {"horse", horse},          {"models", models},       {"molar", molar},   {"voxels", voxels},   {"load", load},
-    {"turned", turned_models}, {"rotations", rotations}, {"shapes", shapes}, {"threads", threads}, {"shifts", shifts}};
+    {"horse", horse},     {"models", models},        {"molar", molar},         {"voxels", voxels},
+    {"load", load},       {"turned", turned_models}, {"rotations", rotations}, {"shapes", shapes},
+    {"threads", threads}, {"shifts", shifts},        {"patch", patch}};
 
 }  // namespace
 
