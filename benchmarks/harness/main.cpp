@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "child.h"
+#include "growth_plot.h"
 #include "history.h"
 #include "suite.h"
 #include "table.h"
@@ -115,8 +116,10 @@ int bench(const Options& options) {
     if (const auto found = done.find(c.beside); found != done.end()) {
       run.beside_cpu_s = found->second.compute_cpu_s;
       run.beside_realize = found->second.realize_per_voxel();
+      run.beside_checks = found->second.checks_per_voxel();
       run.beside_compute_s = found->second.compute_s - found->second.partition_s;
       run.beside_parallel_s = found->second.parallel_s;
+      run.beside_peak_mb = found->second.program.peak_rss_mb;
     }
     if (run.failure.empty()) done.emplace(c.name, run);
     failed += run.failure.empty() ? 0 : 1;
@@ -124,6 +127,8 @@ int bench(const Options& options) {
     json["cases"].push_back(to_json(c, run));
     std::ofstream(options.out / "bench.json") << json.dump(2) << '\n';
   }
+  if (const std::string plot = growth_plot(json.at("cases")); !plot.empty())
+    std::ofstream(options.out / "growth.svg") << plot;
   std::cout << "compute: stages without reading, preparing and writing files; x floor: compute over the floor's; "
                "process: whole "
                "processes.\n"

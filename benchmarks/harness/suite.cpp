@@ -40,6 +40,9 @@ std::vector<Case> costs(const std::filesystem::path& main_model, const SuitePara
   };
   Case crystal = horse, bend = horse;
   crystal.infill = "tcs";
+  Case larger = crystal;
+  larger.size_mm = 200;
+  larger.repeats = 1;
   bend.model = params.assets / "bent_tube.ply";
   bend.size_mm = 60;
   bend.voxel_mm = 0.1;
@@ -50,6 +53,7 @@ std::vector<Case> costs(const std::filesystem::path& main_model, const SuitePara
           made(horse, "cost stress", {"tcs.grade=\"stress\""}, "cost hybrid", graded),
           made(crystal, "cost tcs", {}, "", {}),
           made(crystal, "cost surface", {"tcs.grade=\"surface\""}, "cost tcs", graded),
+          made(larger, "cost checks", {}, "cost tcs", {.checks_times = 1.2}),
           made(bend, "cost bend tcs", {crystal_inside}, "", {}),
           made(bend, "cost bend mfs", {}, "cost bend tcs", swept),
           made(bend, "cost bend taper", {"mfs.taper=true"}, "cost bend tcs", swept)};
@@ -67,30 +71,38 @@ std::vector<Case> suite(const SuiteParams& params) {
   if (!fs::exists(main_model)) throw std::runtime_error(main_model.string() + " is missing");
 
   std::vector<Case> cases;
-  for (const double voxel_mm : {0.4, 0.2, 0.1}) {
+  for (const double voxel_mm : {0.4, 0.2, 0.1, 0.05}) {
     if (params.quick && voxel_mm < 0.2) continue;
     Case peer{.name = "peer-tcs " + label(voxel_mm),
               .model = main_model,
               .voxel_mm = voxel_mm,
               .infill = "tcs",
               .preset = "peer-tcs",
-              .repeats = 3,
+              .repeats = voxel_mm < 0.1 ? 1 : 3,
               .goals = {}};
     // Four times the samples and triangles: surface-bound, not volume-bound.
-    if (voxel_mm < 0.4) peer.goals = {.floor_ratio = 0.6, .cpu_times = 4.5};
+    if (voxel_mm < 0.4) peer.goals.cpu_times = 4.5;
     if (voxel_mm < 0.4) peer.beside = "peer-tcs " + label(2 * voxel_mm);
-    if (voxel_mm < 0.2) peer.goals.peak_rss_mb = 550;
+    if (voxel_mm < 0.4 && voxel_mm >= 0.1) peer.goals.floor_ratio = 0.6;
+    if (voxel_mm == 0.1) peer.goals.peak_rss_mb = 550;
     cases.push_back(peer);
   }
   if (!params.quick) {
-    Case slabs = cases.back();
+    const Case peer = cases[cases.size() - 2];
+    Case slabs = peer;
     slabs.name += " slabs";
     slabs.repeats = 1;
     slabs.max_memory = "300M";
-    slabs.beside = cases.back().name;
+    slabs.beside = peer.name;
     slabs.goals = {.peak_rss_mb = 300 * 1.048576, .cpu_times = 1.8};
     cases.push_back(slabs);
-    Case alone = cases[cases.size() - 2];
+    Case finer = slabs;
+    finer.voxel_mm = 0.05;
+    finer.name = "peer-tcs 0.05 slabs";
+    finer.beside = slabs.name;
+    finer.goals = {.peak_rss_mb = 300 * 1.048576, .peak_times = 1.3};
+    cases.push_back(finer);
+    Case alone = peer;
     alone.beside = alone.name;
     alone.name += " alone";
     alone.repeats = 1;

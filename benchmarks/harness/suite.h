@@ -19,7 +19,9 @@ struct Goals {
   // Beside the case named Case::beside, in the same suite:
   std::optional<double> cpu_times{};      ///< CPU time of the compute stages.
   std::optional<double> realize_times{};  ///< CPU time of `realize` per active voxel.
+  std::optional<double> checks_times{};   ///< CPU time of `print checks` per active voxel.
   std::optional<double> compute_times{};  ///< Wall time of the compute stages, those that decide the parts left out.
+  std::optional<double> peak_times{};     ///< Peak memory.
   std::optional<double> speed_up{};       ///< At least: wall time of `realize` and `surface` here over theirs there.
   // Of fibrolite-floor --band:
   std::optional<double> band_speed_up{};  ///< At least: meshToLevelSet's wall time over to_solid()'s.

@@ -39,6 +39,7 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
     all_cpu_s += stage.cpu_s;
     if (stage.name == "joints") joints_cpu_s += stage.cpu_s;
     if (stage.name == "realize") run.realize_cpu_s += stage.cpu_s;
+    if (stage.name == "print checks") run.checks_cpu_s += stage.cpu_s;
     if (stage.name == "realize" || stage.name == "surface") run.parallel_s += stage.wall_s;
     if (moves_files(stage.name)) {
       run.files_s += stage.wall_s;
@@ -126,8 +127,11 @@ std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
     const std::string over = " / " + c.beside;
     one(("compute CPU" + over).c_str(), c.goals.cpu_times, run.compute_cpu_s / run.beside_cpu_s);
     one(("realize CPU per voxel" + over).c_str(), c.goals.realize_times, run.realize_per_voxel() / run.beside_realize);
+    one(("print checks CPU per voxel" + over).c_str(), c.goals.checks_times,
+        run.checks_per_voxel() / run.beside_checks);
     one(("compute without what decides parts" + over).c_str(), c.goals.compute_times,
         (run.compute_s - run.partition_s) / run.beside_compute_s);
+    one(("peak" + over).c_str(), c.goals.peak_times, run.program.peak_rss_mb / run.beside_peak_mb);
     at_least("realize and surface, time alone" + over, c.goals.speed_up, run.parallel_s / run.beside_parallel_s);
   }
   if (run.band_s > 0) {

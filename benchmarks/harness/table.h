@@ -23,18 +23,20 @@ struct Run {
   double files_s = 0;                       ///< Reading, preparing, writing.
   double partition_s = 0;                   ///< Stages that decide the parts.
   double joints_share = 0;                  ///< Of the CPU time of all stages.
-  double realize_cpu_s = 0;
+  double realize_cpu_s = 0, checks_cpu_s = 0;
   double active_voxels = 0, triangles = 0;
   double floor_compute_s = 0, floor_compute_cpu_s = 0;
   double parallel_s = 0;                           ///< Wall time of `realize` and `surface`.
   double level_set_s = 0, band_s = 0, wide_s = 0;  ///< Of a case that is a band.
   // Of the case to compare with; 0: none was run.
-  double beside_cpu_s = 0, beside_realize = 0, beside_compute_s = 0, beside_parallel_s = 0;
+  double beside_cpu_s = 0, beside_realize = 0, beside_checks = 0, beside_compute_s = 0, beside_parallel_s = 0,
+         beside_peak_mb = 0;
   std::string failure;  ///< Empty if both ended well.
 
   [[nodiscard]] double compute_ratio() const { return compute_s / floor_compute_s; }
   [[nodiscard]] double cpu_ratio() const { return compute_cpu_s / floor_compute_cpu_s; }
   [[nodiscard]] double realize_per_voxel() const { return realize_cpu_s / active_voxels; }
+  [[nodiscard]] double checks_per_voxel() const { return checks_cpu_s / active_voxels; }
   [[nodiscard]] double process_ratio() const { return program.wall_s / floor.wall_s; }
 };
 /// Fill in what the program's report and the floor's answer say.
