@@ -9,7 +9,7 @@
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/picture.h"
 
-namespace CLI {
+namespace CLI {  // NOLINT(readability-identifier-naming): the library's
 class App;
 }
 

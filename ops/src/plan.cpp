@@ -171,7 +171,8 @@ double machine_times() {
   const Shape sticks = crystal(sized(TcsParams{}));
   std::array<float, PointBlock::capacity> x, y, z, out;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    x[i] = 0.25F * static_cast<float>(i / 64);
+    const std::size_t slice = i / 64;
+    x[i] = 0.25F * static_cast<float>(slice);
     y[i] = 0.25F * static_cast<float>(i / 8 % 8);
     z[i] = 0.25F * static_cast<float>(i % 8);
   }

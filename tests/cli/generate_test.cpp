@@ -389,7 +389,7 @@ TEST(Partition, SaysWhichColourIsWhichPart) {
   EXPECT_EQ(middles.size(), parts.size());
   for (const json& part : parts) {
     const std::string name = part["color"]["name"], code = part["color"]["hex"];
-    EXPECT_THAT(finished.out, HasSubstr(name + " " + code));
+    EXPECT_THAT(finished.out, HasSubstr(std::string(name).append(" ").append(code)));
     ASSERT_TRUE(middles.contains(code)) << part["id"] << " is " << code;
     const Solid grid = read_vdb(folder / "p.vdb", "part_" + std::to_string(part["id"].get<int>()));
     for (const Vec3d p : middles.at(code)) ASSERT_LT(std::abs(grid.distance(p)), 2 * grid.grid().voxel_mm) << code;

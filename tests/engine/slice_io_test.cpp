@@ -129,12 +129,12 @@ TEST(SliceIo, ARunThatWasCutShortGoesOnToTheSameBytes) {
       SliceJob part = work;
       part.kept = std::make_shared<KeptWork>(folder / "kept", "this very job\n");
       const std::size_t before = part.kept->parts().size();
-      part.run_from = [&, ready = 0](const SlicePlate& plate, int first) mutable {
+      part.run_from = [&made, &shape = work.shape, ready = 0](const SlicePlate& plate, int first) mutable {
         if (ready >= 42) throw Error(Code::Cancelled, "enough for now");
         const int last = std::min(first + 21, plate.grid.layers);
         made += last - first;
         ready += last - first;
-        return LayerRun{last, work.shape};
+        return LayerRun{last, shape};
       };
       try {
         const auto done = write(folder / name, part);

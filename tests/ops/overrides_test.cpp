@@ -204,7 +204,8 @@ int pieces_of_box(const std::vector<Overrides::Plane>& planes, Vec3d size) {
   constexpr int n = 16;
   std::array<int, 8> count{};
   for (int i = 0; i < n * n * n; ++i) {
-    const Vec3d at{size.x * (i % n + 0.5) / n, size.y * (i / n % n + 0.5) / n, size.z * (i / n / n + 0.5) / n};
+    const int row = i / n % n, slice = i / n / n;
+    const Vec3d at{size.x * (i % n + 0.5) / n, size.y * (row + 0.5) / n, size.z * (slice + 0.5) / n};
     std::size_t cell = 0;
     for (const Overrides::Plane& plane : planes) cell = 2 * cell + (dot(at - plane.point_mm, plane.normal) > 0 ? 1 : 0);
     ++count.at(cell);
