@@ -78,7 +78,7 @@ std::optional<Split> cut_off(const VoxelBody& body, const LevelGraph& graph, con
     const Vec3d at = point_along(line, way * diameter);
     if (body.distance_at(at) >= 0) break;
     Frame frame = frame_along(at, -along);
-    const auto s = section(body, frame, 0.65 * diameter);
+    const auto s = section(body, {frame}, 0.65 * diameter);
     ways.push_back(way);
     areas.push_back(s ? s->area_mm2 : std::numeric_limits<double>::infinity());
   }

@@ -34,22 +34,23 @@ Cut turned(const Cut& cut) {
   std::swap(other.a, other.b);
   other.frame.y = -cut.frame.y;
   other.frame.z = -cut.frame.z;
+  other.bend = cut.bend.turned();
   return other;
 }
 
 }  // namespace
 
 bool Interface::parts_here(const Labels& labels, Vec2d local, double step_mm) const {
-  return labels.label(frame.to_world({local.x, local.y, -step_mm})) == a &&
-         labels.label(frame.to_world({local.x, local.y, step_mm})) == b;
+  const BentPlane here = surface();
+  return labels.label(here.at(local, -step_mm)) == a && labels.label(here.at(local, step_mm)) == b;
 }
 
 std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const Shape& body, double pixel_mm) {
   const double radius = disc_margin * cut.radius_mm;
   const double pixel = std::max(pixel_mm, radius / max_half_side_px);
-  const PlaneGrid grid = PlaneGrid::about(cut.frame, radius, pixel, 1);
+  const PlaneGrid grid = PlaneGrid::about(cut.surface(), radius, pixel, 1);
   const FloatImage depth = sample(body, grid);
-  const Interface whole{.a = cut.a, .b = cut.b, .frame = cut.frame};
+  const Interface whole{.a = cut.a, .b = cut.b, .frame = cut.frame, .bend = cut.bend};
   Image<std::uint8_t> mask(grid.width, grid.height);
   for (int j = 0; j < grid.height; ++j)
     for (int i = 0; i < grid.width; ++i) {
@@ -60,14 +61,17 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
   const Regions found = regions_of(mask);
   const auto count = static_cast<std::size_t>(found.count);
   std::vector<Vec2d> center(count);
-  std::vector<double> reach(count, 0);
+  std::vector<double> reach(count, 0), area(count, 0);
   const auto each = [&](auto&& visit) {
     for (int j = 0; j < grid.height; ++j)
       for (int i = 0; i < grid.width; ++i)
         if (found.label(i, j) > 0) visit(static_cast<std::size_t>(found.label(i, j) - 1), grid.local(i, j));
   };
   each([&](std::size_t r, Vec2d p) { center[r] = center[r] + (1.0 / static_cast<double>(found.pixels[r])) * p; });
-  each([&](std::size_t r, Vec2d p) { reach[r] = std::max(reach[r], norm(p - center[r])); });
+  each([&](std::size_t r, Vec2d p) {
+    reach[r] = std::max(reach[r], norm(p - center[r]));
+    area[r] += cut.bend.stretch(p);
+  });
   const std::int64_t largest = count == 0 ? 0 : *std::max_element(found.pixels.begin(), found.pixels.end());
   // Where other pairs meet in the same section too, there may be nothing but a sliver of this one.
   const auto of_body = std::count_if(depth.pixels.begin(), depth.pixels.end(), [](float d) { return d < 0; });
@@ -80,9 +84,10 @@ std::vector<Interface> sections_of(const Cut& cut, const Labels& labels, const S
     section.a = cut.a;
     section.b = cut.b;
     section.frame = cut.frame;
-    section.frame.origin = cut.frame.to_world({center[r].x, center[r].y, 0});
+    section.frame.origin = cut.surface().at(center[r]);
+    section.bend = cut.bend.about(center[r]);
     section.radius_mm = reach[r] + pixel;
-    section.area_mm2 = static_cast<double>(found.pixels[r]) * pixel * pixel;
+    section.area_mm2 = area[r] * pixel * pixel;
     if (cut.shared) section.within = labels;
     result.push_back(section);
   }
@@ -94,18 +99,19 @@ double demand_n(const Interface& section, const Labels& labels, const Shape& bod
   if (section.length_mm > 0) return mantle_demand_n(section, labels, body, traction_mpa);
   constexpr int across = 36;  // a disc of this many pixels has about a thousand
   const double pixel = 2 * section.radius_mm / across;
-  const PlaneGrid grid = PlaneGrid::about(section.frame, section.radius_mm, pixel, 1);
+  const PlaneGrid grid = PlaneGrid::about(section.surface(), section.radius_mm, pixel, 1);
   const FloatImage depth = sample(body, grid);
-  double sum = 0;
-  int points = 0;
+  double sum = 0, weights = 0;
   for (int j = 0; j < grid.height; ++j)
     for (int i = 0; i < grid.width; ++i) {
       if (depth(i, j) >= 0 || norm(grid.local(i, j)) > section.radius_mm) continue;
       if (!section.parts_here(labels, grid.local(i, j), pixel)) continue;
-      sum += traction_mpa(grid.world(i, j, 0), section.frame.z);
-      ++points;
+      const Vec2d at = grid.local(i, j);
+      const double weight = section.bend.stretch(at);
+      sum += weight * traction_mpa(grid.world(i, j, 0), section.surface().normal(at));
+      weights += weight;
     }
-  return points > 0 ? sum / points * section.area_mm2 : 0;
+  return weights > 0 ? sum / weights * section.area_mm2 : 0;
 }
 
 std::vector<Interface> interfaces(const Parts& parts, const Shape& body, double pixel_mm, const Context& context) {

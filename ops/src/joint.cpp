@@ -65,6 +65,60 @@ class Slab final : public Shape::Function {
   double lipschitz_;
 };
 
+/// A section image on a bent plane made a layer: each point asks at its foot. The surface counts within a cylinder
+/// about the frame's z axis; beyond it, and far above or below, distances are lower bounds.
+class BentSlab final : public Shape::Function {
+ public:
+  BentSlab(const Layer& layer, const BentPlane& surface, double thickness_mm, double lipschitz)
+      : image_(layer.distance_mm),
+        surface_(surface),
+        corner_(layer.origin_mm),
+        pixel_mm_(layer.pixel_mm),
+        radius_mm_(0.5 * (image_.width - 1) * pixel_mm_),
+        half_mm_(thickness_mm / 2),
+        steepest_(std::hypot(1, surface.bend.steepest(radius_mm_))),
+        near_mm_(steepest_ * (half_mm_ + Layer::cap_px * pixel_mm_)) {
+    // Feet draw near to each other towards the centre of curvature.
+    constexpr double least_spread = 0.25;
+    lipschitz_ = lipschitz * steepest_ / std::max(1 - near_mm_ * surface.bend.curvature(), least_spread);
+  }
+
+  void evaluate(const PointBlock& block, float* out) const override {
+    const Bend& bend = surface_.bend;
+    const Frame& f = surface_.frame;
+    for (int i = 0; i < block.count; ++i) {
+      const Vec3d q = f.to_local({block.x[i], block.y[i], block.z[i]});
+      const double off_axis = std::hypot(q.x, q.y), beyond = off_axis - radius_mm_;
+      const Vec2d local = (beyond > 0 ? radius_mm_ / off_axis : 1.0) * Vec2d{q.x, q.y};
+      const double above = q.z - bend.height(local);
+      const double near = std::clamp(above, -near_mm_, near_mm_);
+      const BentPlane::Foot foot = surface_.foot(f.to_world({local.x, local.y, bend.height(local) + near}));
+      const double height = std::abs(foot.above_mm) + (std::abs(above) - std::abs(near)) / steepest_ - half_mm_;
+      const Vec2d at = (1 / pixel_mm_) * (foot.local - corner_);
+      const float layer = bilinear(image_, static_cast<float>(at.x), static_cast<float>(at.y));
+      out[i] = std::max(static_cast<float>(std::max(height, beyond)), layer);
+    }
+  }
+  /// As of a plane slab.
+  [[nodiscard]] Interval bound(const Box3d& box) const override {
+    const Vec3f c = to_float(box.center());
+    float value = 0;
+    evaluate({&c.x, &c.y, &c.z, 1}, &value);
+    const auto reach = static_cast<float>(lipschitz_ * (0.5 * norm(box.size()) + 1.5 * pixel_mm_));
+    return {value - reach, value + reach};
+  }
+  [[nodiscard]] double lipschitz() const override { return lipschitz_ * std::sqrt(2.0); }
+
+ private:
+  FloatImage image_;
+  BentPlane surface_;
+  Vec2d corner_;
+  double pixel_mm_, radius_mm_, half_mm_;
+  double steepest_;  // of an upward path on it, over that of the plane below
+  double near_mm_;   // so far along z, feet are looked for
+  double lipschitz_ = 1;
+};
+
 void check(const JointParams& p) {
   const auto positive = [](double value, const char* key) {
     if (!(value > 0) || !std::isfinite(value))
@@ -79,8 +133,11 @@ void check(const JointParams& p) {
                 "raise spacing_mm or lower column_mm");
 }
 
-/// The frame seen from part b: z points from b into a.
-Frame turned(const Frame& f) { return {f.origin, f.x, -f.y, -f.z}; }
+/// The surface seen from part b: z points from b into a.
+BentPlane turned(const BentPlane& s) {
+  const Frame& f = s.frame;
+  return {{f.origin, f.x, -f.y, -f.z}, s.bend.turned()};
+}
 
 /// The layer seen from part b: rows run the other way.
 Layer turned(const Layer& layer) {
@@ -110,24 +167,27 @@ Joint join(const Interface& interface, const Shape& fill_a, const Shape& fill_b,
   context.progress(0.5);
 
   const Shape lumen = offset(body, -shell_mm);
-  const auto contact_of_side = [&](const Layer& layer, const Frame& frame, const Shape& fill, bool is_crystal,
+  const auto contact_of_side = [&](const Layer& layer, const BentPlane& surface, const Shape& fill, bool is_crystal,
                                    std::string_view name) {
-    const Face face = face_of(layer, frame, fill, lumen, params.layer_mm);
-    const double touching = contact_area_mm2(layer, face);
+    const Face face = face_of(layer, surface, fill, lumen, params.layer_mm);
+    const double touching = contact_area_mm2(layer, surface, face);
     if (!is_crystal || !params.columns) return touching;
     const Random own(seed, name, static_cast<std::uint64_t>(index));
-    SupportColumns found = support_columns(layer, frame, fill, face, stick_mm, lumen, params, own, context);
+    SupportColumns found = support_columns(layer, surface, fill, face, stick_mm, lumen, params, own, context);
     joint.columns.insert(joint.columns.end(), found.columns.begin(), found.columns.end());
     joint.columns_dropped += found.dropped;
     return touching +
            static_cast<double>(found.columns.size()) * std::numbers::pi / 4 * params.column_mm * params.column_mm;
   };
   joint.contact_area_mm2 =
-      std::min(contact_of_side(turned(joint.layer), turned(interface.frame), fill_a, crystal_a, "joint.a"),
-               contact_of_side(joint.layer, interface.frame, fill_b, crystal_b, "joint"));
+      std::min(contact_of_side(turned(joint.layer), turned(interface.surface()), fill_a, crystal_a, "joint.a"),
+               contact_of_side(joint.layer, interface.surface(), fill_b, crystal_b, "joint"));
 
   const double lipschitz = std::max({1.0, fill_a.lipschitz(), fill_b.lipschitz(), body.lipschitz()});
-  Shape slab(std::make_shared<Slab>(joint.layer, interface.frame, params.layer_mm, lipschitz));
+  const Shape slab =
+      interface.bend.flat()
+          ? Shape(std::make_shared<Slab>(joint.layer, interface.frame, params.layer_mm, lipschitz))
+          : Shape(std::make_shared<BentSlab>(joint.layer, interface.surface(), params.layer_mm, lipschitz));
   joint.shape = joint.columns.empty() ? slab : unite({slab, capsules(joint.columns)});
   const std::string where = "joint " + std::to_string(index) + " between parts " + std::to_string(interface.a) +
                             " and " + std::to_string(interface.b);

@@ -12,16 +12,16 @@ constexpr double clamp_vox = 4;      // how far from a cut the fields are distan
 constexpr double rim_vox = 2;        // the disc of a cut is this much wider than the section
 constexpr double outside_vox = 3.5;  // how far outside of the body the plane of a cut still decides
 
-// Distance to the disc of a cut; the sign of z says on which side.
+// Distance to the disc of a cut, bent or not; the sign of z says on which side.
 struct DiscDistance {
   double mm = 0;
   bool far_side = false;
   bool in_cylinder = false;
 };
-DiscDistance disc_distance(const Frame& frame, double radius, Vec3d p) {
-  const Vec3d q = frame.to_local(p);
-  const double beyond = std::hypot(q.x, q.y) - radius;
-  return {beyond > 0 ? std::hypot(q.z, beyond) : std::abs(q.z), q.z >= 0, beyond <= 0};
+DiscDistance disc_distance(const BentPlane& surface, double radius, Vec3d p) {
+  const Vec3d q = surface.flattened(p);
+  const double beyond = std::hypot(q.x, q.y) - radius, away = std::abs(surface.foot(p).above_mm);
+  return {beyond > 0 ? std::hypot(away, beyond) : away, q.z >= 0, beyond <= 0};
 }
 
 }  // namespace
@@ -54,7 +54,8 @@ LabelSamples make_label_samples(const Anatomy& anatomy, const CutPieces& pieces,
     beside.insert(beside.end(), pieces.severed[k].far.begin(), pieces.severed[k].far.end());
     // Through the body, so that a neighbouring limb that passes the disc closely knows nothing of the cut.
     const std::vector<float> way = geodesic(body, body.links, beside, 1.6 * s.clamp_mm + rim_vox * h);
-    const double reach = radius + s.clamp_mm;
+    const double reach = radius * (1 + cut.bend.steepest(radius)) + s.clamp_mm;
+    const BentPlane surface = cut.surface();
     const auto sample = [&](double p, double origin, std::int32_t n) {
       return std::clamp(static_cast<std::int32_t>(std::floor((p - origin) / h)), 0, n - 1);
     };
@@ -67,7 +68,7 @@ LabelSamples make_label_samples(const Anatomy& anatomy, const CutPieces& pieces,
       const std::int32_t inside = anatomy.nearest[at];
       const float from_cut = way[static_cast<std::size_t>(inside)];
       if (from_cut < 0) return;
-      const DiscDistance disc = disc_distance(cut.frame, radius, p);
+      const DiscDistance disc = disc_distance(surface, radius, p);
       double mm = disc.mm;
       if (mm >= s.clamp_mm) return;
       if (body.inside[at] < 0) {

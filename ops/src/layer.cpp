@@ -70,15 +70,15 @@ void drop_grazes(Layer& layer) {
 
 /// Area inside the body of what is negative, mm2. Pixels on an edge count in part, so that the raster's place does not
 /// matter.
-double area_mm2(const FloatImage& distance_mm, const FloatImage& depth, const FloatImage& rim, double pixel_mm) {
+double area_mm2(const FloatImage& distance_mm, const FloatImage& depth, const FloatImage& rim, const PlaneGrid& grid) {
+  const double pixel_mm = grid.pixel_mm;
   double pixels = 0;
-  for (std::size_t i = 0; i < rim.pixels.size(); ++i)
-    if (rim.pixels[i] < -(rim_px - 1.5) * pixel_mm)  // the section and the pixels around it
-      pixels += coverage(distance_mm.pixels[i], pixel_mm) * coverage(depth.pixels[i], pixel_mm);
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i)
+      if (rim(i, j) < -(rim_px - 1.5) * pixel_mm)  // the section and the pixels around it
+        pixels += coverage(distance_mm(i, j), pixel_mm) * coverage(depth(i, j), pixel_mm) *
+                  grid.bend.stretch(grid.local(i, j));
   return pixels * pixel_mm * pixel_mm;
-}
-double area_mm2(const Layer& layer, const FloatImage& depth, const FloatImage& rim) {
-  return area_mm2(layer.distance_mm, depth, rim, layer.pixel_mm);
 }
 
 }  // namespace
@@ -87,7 +87,7 @@ int regions(const Layer& layer) { return regions_of(layer.solid).count; }
 
 Layer transient_layer(const Interface& interface, const Shape& fill_a, const Shape& fill_b, const Shape& body,
                       double shell_mm, double pixel_mm, const JointParams& params) {
-  const PlaneGrid grid = PlaneGrid::about(interface.frame, interface.radius_mm, pixel_mm, rim_px + 3);
+  const PlaneGrid grid = PlaneGrid::about(interface.surface(), interface.radius_mm, pixel_mm, rim_px + 3);
   const FloatImage depth = sample(body, grid), a = sample(fill_a, grid), b = sample(fill_b, grid);
   const Image<std::uint8_t> section = own_section(interface, grid, depth, interface.radius_mm + pixel_mm);
   const FloatImage rim = rim_distance(section, pixel_mm);
@@ -105,17 +105,17 @@ Layer transient_layer(const Interface& interface, const Shape& fill_a, const Sha
     layer.distance_mm.pixels[i] = joined;
     layer.solid.pixels[i] = section.pixels[i] != 0 && joined < 0;
   }
-  layer.shell_area_mm2 = area_mm2(ring, depth, rim, pixel_mm);
+  layer.shell_area_mm2 = area_mm2(ring, depth, rim, grid);
   drop_grazes(layer);
   layer.regions_before = regions(layer);
-  layer.union_area_mm2 = area_mm2(layer, depth, rim);
+  layer.union_area_mm2 = area_mm2(layer.distance_mm, depth, rim, grid);
   if (layer.regions_before > 1) {
     Layer other = layer;
     join_regions(other, section, params.bridge == Bridge::Mst ? Bridge::Bbox : Bridge::Mst, params.min_wall_mm);
-    layer.other_bridge_area_mm2 = std::max(0.0, area_mm2(other, depth, rim) - layer.union_area_mm2);
+    layer.other_bridge_area_mm2 = std::max(0.0, area_mm2(other.distance_mm, depth, rim, grid) - layer.union_area_mm2);
   }
   join_regions(layer, section, params.bridge, params.min_wall_mm);
-  layer.bridge_area_mm2 = std::max(0.0, area_mm2(layer, depth, rim) - layer.union_area_mm2);
+  layer.bridge_area_mm2 = std::max(0.0, area_mm2(layer.distance_mm, depth, rim, grid) - layer.union_area_mm2);
   layer.regions_after = regions(layer);
   // Bridges were drawn only that far around themselves: beyond, nothing larger may be claimed.
   const auto cap = static_cast<float>(Layer::cap_px * pixel_mm);

@@ -51,6 +51,7 @@ void check_overrides(const Overrides& overrides) {
     if (!finite(cut.point_mm) || !finite(cut.normal) || !(norm(cut.normal) > 0))
       refuse("cuts", i, "a cut needs a point and a normal with a length",
              R"(e.g. {"point_mm": [0, 0, 5], "normal": [0, 0, 1]})");
+    if (!std::isfinite(cut.radius_mm)) refuse("cuts", i, "the radius is no number", "leave it out for a plane");
   }
   for (std::size_t i = 0; i < overrides.solid.size(); ++i) {
     std::visit(Match{[&](const Box3d& box) {

@@ -27,7 +27,8 @@ Overrides::PartChoice part_choice(const Reader& reader) {
 Overrides::Plane plane(const Reader& reader) {
   Overrides::Plane cut;
   reader.object({{"point_mm", [&](const Reader& r) { cut.point_mm = r.vector(); }},
-                 {"normal", [&](const Reader& r) { cut.normal = r.vector(); }}});
+                 {"normal", [&](const Reader& r) { cut.normal = r.vector(); }},
+                 {"radius_mm", [&](const Reader& r) { cut.radius_mm = r.number(); }}});
   if (!reader.has("point_mm") || !reader.has("normal"))
     reader.refuse(R"(both: {"point_mm": [0, 0, 5], "normal": [0, 0, 1]})");
   return cut;
@@ -74,8 +75,10 @@ Overrides overrides_from(const Json& json, const std::string& source) {
 Json written(const Overrides& overrides) {
   Json parts = Json::array(), cuts = Json::array(), solid = Json::array();
   for (const auto& choice : overrides.parts) parts.push_back(Json{{"id", choice.id}, {"infill", name(choice.infill)}});
-  for (const auto& cut : overrides.cuts)
+  for (const auto& cut : overrides.cuts) {
     cuts.push_back(Json{{"point_mm", written(cut.point_mm)}, {"normal", written(cut.normal)}});
+    if (cut.radius_mm != 0) cuts.back()["radius_mm"] = cut.radius_mm;
+  }
   for (const KeptRegion& region : overrides.solid) solid.push_back(written(region));
   return {{"parts", parts}, {"cuts", cuts}, {"solid", solid}};
 }

@@ -139,16 +139,25 @@ Choice whole_body(const Anatomy& anatomy, double min_area) {
   return choice;
 }
 
-// The connected section of the body in a plane, through the point or the nearest place within a voxel of it.
+// The connected section of the body in a plane or bowl, through the point or the nearest place within a voxel of it.
 Section own_section(const Anatomy& anatomy, const Overrides::Plane& plane, std::size_t number) {
+  constexpr double steepest = 1;
+  const std::string where = std::string("partition.overrides.cuts[").append(std::to_string(number)).append("]");
   const Vec3d here = anatomy.frame.to_local(plane.point_mm);
   const Frame frame = frame_along(here, anatomy.frame.to_local(plane.point_mm + normalized(plane.normal)) - here);
   const VoxelBody& body = anatomy.body;
+  BentPlane surface{frame};
+  if (plane.radius_mm != 0) surface.bend.xx = surface.bend.yy = 0.5 / plane.radius_mm;
   // A reach that is too small finds no end of the section, one that is too large sees it too coarsely.
   for (double reach = 2 * body.voxel_mm; reach < 2 * bounds(*anatomy.surface).longest_side(); reach *= 1.5)
-    if (std::optional<Section> found = section(body, frame, reach)) return *found;
-  throw Error(Code::BadRecipe, "this plane meets no section of the model near its point",
-              std::string("partition.overrides.cuts[").append(std::to_string(number)).append("]"),
+    if (std::optional<Section> found = section(body, surface, reach)) {
+      if (found->bend.steepest(found->radius_mm) <= steepest) return *found;
+      throw Error(Code::BadRecipe, "the cut is bent too much for a section this wide", where,
+                  "make radius_mm " +
+                      number_text(std::ceil(std::abs(plane.radius_mm) * found->bend.steepest(found->radius_mm)), 4) +
+                      " or more, or leave it out for a plane");
+    }
+  throw Error(Code::BadRecipe, "this cut meets no section of the model near its point", where,
               "put point_mm inside the model");
 }
 
@@ -202,7 +211,7 @@ std::vector<std::uint8_t> limb_pieces(const CutPieces& pieces, const std::vector
 
 bool contains(const std::vector<Section>& list, const Section& cut) {
   return std::any_of(list.begin(), list.end(), [&](const Section& other) {
-    return other.frame.origin == cut.frame.origin && other.frame.z == cut.frame.z;
+    return other.frame.origin == cut.frame.origin && other.frame.z == cut.frame.z && other.bend == cut.bend;
   });
 }
 
@@ -365,7 +374,8 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   for (std::size_t c = 0; c < pieces.cuts.size(); ++c) {
     const auto& side = pieces.sides[c];
     result.cuts.push_back({name[static_cast<std::size_t>(side[0])], name[static_cast<std::size_t>(side[1])],
-                           pieces.cuts[c].frame, pieces.cuts[c].radius_mm, own, pieces.shared[c] != 0});
+                           pieces.cuts[c].frame, pieces.cuts[c].radius_mm, own, pieces.shared[c] != 0,
+                           pieces.cuts[c].bend});
   }
   context.progress(0.9);
   if (pieces.count > 1) result.labels = make_labels(make_label_samples(anatomy, pieces, name));

@@ -37,9 +37,9 @@ void evaluate_all(const Shape& shape, std::size_t count, const Point& point, flo
 
 }  // namespace
 
-PlaneGrid PlaneGrid::about(const Frame& frame, double radius_mm, double pixel_mm, int border_px) {
+PlaneGrid PlaneGrid::about(const BentPlane& surface, double radius_mm, double pixel_mm, int border_px) {
   const int half = static_cast<int>(std::ceil(radius_mm / pixel_mm)) + border_px;
-  return {frame, {-half * pixel_mm, -half * pixel_mm}, pixel_mm, 2 * half + 1, 2 * half + 1};
+  return {surface.frame, {-half * pixel_mm, -half * pixel_mm}, pixel_mm, 2 * half + 1, 2 * half + 1, surface.bend};
 }
 
 FloatImage sample(const Shape& shape, const PlaneGrid& grid, double z_mm) {

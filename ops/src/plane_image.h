@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Shapes sampled on a plane. Private to ops.
+// Shapes sampled on a plane, or a bent one. Private to ops.
 #pragma once
 
 #include <algorithm>
@@ -8,30 +8,32 @@
 
 #include "fibrolite/frame.h"
 #include "fibrolite/image.h"
+#include "fibrolite/ops/bent_plane.h"
 #include "fibrolite/shape.h"
 
 namespace fibrolite {
 
-/// A raster in the xy plane of a frame: pixel (i, j) lies at local corner_mm + pixel_mm * (i, j).
+/// A raster in the xy plane of a frame: pixel (i, j) lies at local corner_mm + pixel_mm * (i, j), or over that place on
+/// the bent plane.
 struct PlaneGrid {
   Frame frame;
   Vec2d corner_mm;
   double pixel_mm = 0.1;
   int width = 0, height = 0;
+  Bend bend{};
 
   [[nodiscard]] Vec2d local(double i, double j) const { return corner_mm + pixel_mm * Vec2d{i, j}; }
   [[nodiscard]] Vec3d world(int i, int j, double z_mm = 0) const {
-    const Vec2d p = local(i, j);
-    return frame.to_world({p.x, p.y, z_mm});
+    return BentPlane{frame, bend}.at(local(i, j), z_mm);
   }
   [[nodiscard]] std::size_t pixels() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   }
   /// The raster that covers a disc about the origin, a pixel at the origin, `border_px` more on each side.
-  static PlaneGrid about(const Frame& frame, double radius_mm, double pixel_mm, int border_px);
+  static PlaneGrid about(const BentPlane& surface, double radius_mm, double pixel_mm, int border_px);
 };
 
-/// The shape's value at every pixel, in the plane `z_mm` above the frame's. Parallel.
+/// The shape's value at every pixel, `z_mm` above the surface. Parallel.
 [[nodiscard]] FloatImage sample(const Shape& shape, const PlaneGrid& grid, double z_mm = 0);
 
 /// The same for points given in local coordinates; any number. Parallel, 512 points at a time.

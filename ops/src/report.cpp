@@ -86,7 +86,9 @@ Json to_json(const InterfaceReport& interface) {
   return {{"parts", {interface.a, interface.b}},
           {"centroid_mm", list(interface.centroid_mm)},
           {"normal", list(interface.normal)},
-          {"border", interface.radius_mm > 0 ? "mantle" : "plane"},
+          {"border", interface.radius_mm > 0 ? "mantle"
+                     : interface.bent        ? "bent"
+                                             : "plane"},
           {"area_mm2", interface.area_mm2},
           {"regions_before", interface.regions_before},
           {"regions_after", interface.regions_after},

@@ -77,6 +77,7 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
     row.b = interfaces[i].b;
     row.centroid_mm = interfaces[i].frame.to_world({0, 0, 0.5 * interfaces[i].length_mm});
     row.radius_mm = interfaces[i].length_mm > 0 ? interfaces[i].radius_mm : 0;
+    row.bent = !interfaces[i].bend.flat();
     row.normal = interfaces[i].frame.z;
     row.area_mm2 = interfaces[i].area_mm2;
     row.regions_before = joint.layer.regions_before;

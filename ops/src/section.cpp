@@ -30,14 +30,14 @@ Pixels pixels_for(const VoxelBody& body, double reach) {
 
 // Flood from the pixel nearest to the middle; false if there is nothing to flood within reach or the flood meets the
 // rim.
-bool flood(const VoxelBody& body, const Frame& frame, double reach, Pixels& p) {
+bool flood(const VoxelBody& body, const BentPlane& surface, double reach, Pixels& p) {
   const auto n = static_cast<std::size_t>(p.side);
   std::vector<std::int8_t> state(n * n, -1);  // -1 not asked yet, 0 outside, 1 inside
   const auto inside = [&](int i, int j) {
     std::int8_t& s = state[static_cast<std::size_t>(j) * n + static_cast<std::size_t>(i)];
     if (s < 0) {
-      const Vec3d local{p.first_mm + i * p.pixel_mm, p.first_mm + j * p.pixel_mm, 0};
-      s = body.distance_at(frame.to_world(local)) < 0 ? 1 : 0;
+      const Vec2d local{p.first_mm + i * p.pixel_mm, p.first_mm + j * p.pixel_mm};
+      s = body.distance_at(surface.at(local)) < 0 ? 1 : 0;
     }
     return s == 1;
   };
@@ -113,27 +113,29 @@ bool Section::covers(double x_mm, double y_mm) const {
   return mask[static_cast<std::size_t>(j) * static_cast<std::size_t>(side) + static_cast<std::size_t>(i)] != 0;
 }
 
-std::optional<Section> section(const VoxelBody& body, const Frame& frame, double reach_mm) {
+std::optional<Section> section(const VoxelBody& body, const BentPlane& surface, double reach_mm) {
   Pixels p = pixels_for(body, reach_mm);
-  if (!flood(body, frame, reach_mm, p)) return std::nullopt;
+  if (!flood(body, surface, reach_mm, p)) return std::nullopt;
   Vec3d sum{};
   for (int j = 0; j < p.side; ++j)
     for (int i = 0; i < p.side; ++i)
       if (p.filled[static_cast<std::size_t>(j * p.side + i)] != 0)
         sum = sum + Vec3d{p.first_mm + i * p.pixel_mm, p.first_mm + j * p.pixel_mm, 0};
   const Vec3d centre = sum / p.count;
-  double radius2 = 0;
+  double radius2 = 0, stretch = 0;
   for (int j = 0; j < p.side; ++j) {
     for (int i = 0; i < p.side; ++i) {
       if (p.filled[static_cast<std::size_t>(j * p.side + i)] == 0) continue;
-      const Vec3d gap = Vec3d{p.first_mm + i * p.pixel_mm, p.first_mm + j * p.pixel_mm, 0} - centre;
+      const Vec3d at{p.first_mm + i * p.pixel_mm, p.first_mm + j * p.pixel_mm, 0}, gap = at - centre;
+      stretch += surface.bend.stretch({at.x, at.y});
       radius2 = std::max(radius2, dot(gap, gap));
     }
   }
   Section s;
-  s.frame = frame;
-  s.frame.origin = frame.to_world(centre);
-  s.area_mm2 = area_of(p);
+  s.frame = surface.frame;
+  s.frame.origin = surface.at({centre.x, centre.y});
+  s.bend = surface.bend.about({centre.x, centre.y});
+  s.area_mm2 = stretch * p.pixel_mm * p.pixel_mm;
   s.radius_mm = std::sqrt(radius2) + p.pixel_mm;
   s.mask_origin = Vec3d{p.first_mm, p.first_mm, 0} - centre;
   s.pixel_mm = p.pixel_mm;
@@ -159,7 +161,7 @@ std::optional<Section> cleanest_section(const VoxelBody& body, Vec3d centre, Vec
   const auto consider = [&](double angle, double azimuth, double along) {
     const Frame frame = tilted(base, centre, angle, azimuth, along);
     Pixels p = pixels_for(body, reach_mm);
-    if (!flood(body, frame, reach_mm, p)) return;
+    if (!flood(body, {frame}, reach_mm, p)) return;
     // Area alone would walk down a tapering limb and lean over: moving and tilting have their price.
     const double moved = along / reach_mm;
     const double cost = area_of(p) * (1 + 0.5 * moved * moved + 0.5 * angle * angle);
@@ -192,15 +194,19 @@ std::optional<Section> cleanest_section(const VoxelBody& body, Vec3d centre, Vec
       }
     }
   }
-  return section(body, *best, reach_mm);
+  return section(body, {*best}, reach_mm);
 }
 
 Severed sever(const VoxelBody& body, const Section& cut, Links& links) {
   Severed severed;
   const double reach = cut.radius_mm + 2 * body.voxel_mm;
+  const BentPlane surface = cut.surface();
   const Frame& f = cut.frame;
-  // Half sizes of the disc's box.
-  const auto extent = [&](double nx) { return reach * std::sqrt(std::max(1 - nx * nx, 0.0)) + 2 * body.voxel_mm; };
+  // Half sizes of the box of the disc, and of what bends up from it.
+  const double high_mm = cut.bend.steepest(reach) * reach;
+  const auto extent = [&](double nx) {
+    return reach * std::sqrt(std::max(1 - nx * nx, 0.0)) + high_mm * std::abs(nx) + 2 * body.voxel_mm;
+  };
   const Vec3d half{extent(f.z.x), extent(f.z.y), extent(f.z.z)};
   const Vec3d low = (f.origin - half - body.origin) / body.voxel_mm;
   const Vec3d high = (f.origin + half - body.origin) / body.voxel_mm;
@@ -209,9 +215,9 @@ Severed sever(const VoxelBody& body, const Section& cut, Links& links) {
   };
   const auto cross_link = [&](std::int32_t s, int d) {
     const std::int32_t n = body.neighbour(s, d);
-    const Vec3d a = f.to_local(body.position(s));
-    const Vec3d b = f.to_local(body.position(n));
-    // A sample on the plane belongs to the far side.
+    const Vec3d a = surface.flattened(body.position(s));
+    const Vec3d b = surface.flattened(body.position(n));
+    // A sample on the surface belongs to the far side.
     if ((a.z < 0) == (b.z < 0)) return;
     const double t = a.z / (a.z - b.z);
     if (!cut.covers(a.x + t * (b.x - a.x), a.y + t * (b.y - a.y))) return;

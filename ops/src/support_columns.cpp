@@ -12,7 +12,7 @@
 namespace fibrolite {
 namespace {
 
-/// Sphere tracing of many rays at once. Every ray starts at its own height and climbs along +z of the frame.
+/// Sphere tracing of many rays at once. Every ray starts at its own height and climbs along the normal at its foot.
 struct Ray {
   Vec2d foot;
   double z_mm;
@@ -20,8 +20,8 @@ struct Ray {
 
 /// For each ray the height at which `shape` first falls to `level` or below, or nothing within `end_mm`. `step_mm` is
 /// the least step: what is thinner along the ray may be missed.
-std::vector<std::optional<double>> climb(const Shape& shape, const Frame& frame, std::vector<Ray> rays, double level,
-                                         double end_mm, double step_mm, const Context& context) {
+std::vector<std::optional<double>> climb(const Shape& shape, const BentPlane& surface, std::vector<Ray> rays,
+                                         double level, double end_mm, double step_mm, const Context& context) {
   std::vector<std::optional<double>> hit(rays.size());
   std::vector<std::size_t> active(rays.size());
   for (std::size_t i = 0; i < active.size(); ++i) active[i] = i;
@@ -31,7 +31,7 @@ std::vector<std::optional<double>> climb(const Shape& shape, const Frame& frame,
   while (!active.empty()) {
     context.check();
     points.clear();
-    for (const std::size_t i : active) points.push_back(frame.to_world({rays[i].foot.x, rays[i].foot.y, rays[i].z_mm}));
+    for (const std::size_t i : active) points.push_back(surface.at(rays[i].foot, rays[i].z_mm));
     evaluate_parallel(shape, points, value);
     std::vector<std::size_t> still;
     for (std::size_t k = 0; k < active.size(); ++k) {
@@ -88,26 +88,32 @@ std::vector<Vec2d> under_crystal(const FootGrid& feet, const std::vector<char>& 
   return kept;
 }
 
+PlaneGrid raster_of(const Layer& layer, const BentPlane& surface) {
+  return {surface.frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height, surface.bend};
+}
+
 bool apart(Vec2d p, const std::vector<Vec2d>& others, double distance) {
   return std::none_of(others.begin(), others.end(), [&](Vec2d q) { return norm(p - q) < distance; });
 }
 
 }  // namespace
 
-Face face_of(const Layer& layer, const Frame& frame, const Shape& fill, const Shape& lumen, double layer_mm) {
-  const PlaneGrid grid{frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height};
+Face face_of(const Layer& layer, const BentPlane& surface, const Shape& fill, const Shape& lumen, double layer_mm) {
+  const PlaneGrid grid = raster_of(layer, surface);
   return {sample(fill, grid, layer_mm / 2), sample(lumen, grid, layer_mm / 2)};
 }
 
-double contact_area_mm2(const Layer& layer, const Face& face) {
+double contact_area_mm2(const Layer& layer, const BentPlane& surface, const Face& face) {
+  const PlaneGrid grid = raster_of(layer, surface);
   double pixels = 0;
-  for (std::size_t i = 0; i < face.fill_mm.pixels.size(); ++i)
-    pixels += coverage(layer.distance_mm.pixels[i], layer.pixel_mm) * coverage(face.fill_mm.pixels[i], layer.pixel_mm) *
-              coverage(face.lumen_mm.pixels[i], layer.pixel_mm);
+  for (int j = 0; j < grid.height; ++j)
+    for (int i = 0; i < grid.width; ++i)
+      pixels += coverage(layer.distance_mm(i, j), layer.pixel_mm) * coverage(face.fill_mm(i, j), layer.pixel_mm) *
+                coverage(face.lumen_mm(i, j), layer.pixel_mm) * surface.bend.stretch(grid.local(i, j));
   return pixels * layer.pixel_mm * layer.pixel_mm;
 }
 
-SupportColumns support_columns(const Layer& layer, const Frame& frame, const Shape& crystal, const Face& at_layer,
+SupportColumns support_columns(const Layer& layer, const BentPlane& surface, const Shape& crystal, const Face& at_layer,
                                double stick_mm, const Shape& lumen, const JointParams& params, Random random,
                                const Context& context) {
   const double face = params.layer_mm / 2, step = stick_mm / 8;
@@ -119,16 +125,16 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
   };
   std::vector<float> depth;
   std::vector<Vec3d> at_face;
-  for (const Vec2d foot : feet.foot) at_face.push_back(frame.to_world({foot.x, foot.y, face}));
+  for (const Vec2d foot : feet.foot) at_face.push_back(surface.at(foot, face));
   evaluate_parallel(lumen, at_face, depth);
-  const auto one_cell = climb(crystal, frame, rays_from(feet.foot), 0, face + params.reach_mm / 2, step, context);
+  const auto one_cell = climb(crystal, surface, rays_from(feet.foot), 0, face + params.reach_mm / 2, step, context);
   SupportColumns result;
   std::vector<char> below(feet.foot.size());
   for (std::size_t k = 0; k < feet.foot.size(); ++k) {
     below[k] = depth[k] < 0 && one_cell[k].has_value() && *one_cell[k] > face;
   }
   // Where the crystal stands on the layer by itself.
-  const PlaneGrid grid{frame, layer.origin_mm, layer.pixel_mm, layer.solid.width, layer.solid.height};
+  const PlaneGrid grid = raster_of(layer, surface);
   std::vector<Vec2d> touching;
   for (int y = 0; y < grid.height; y += feet.stride)
     for (int x = 0; x < grid.width; x += feet.stride)
@@ -137,9 +143,9 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
   std::vector<Vec2d> darts = under_crystal(feet, below, layer.pixel_mm, params.column_mm);
   for (std::size_t i = darts.size(); i > 1; --i) std::swap(darts[i - 1], darts[random.below(i)]);
   // Half a stick's radius deep: a whole radius is its axis alone, which a ray meets only by chance.
-  const auto top = climb(crystal, frame, rays_from(darts), -stick_mm / 4, face + params.reach_mm, step, context);
+  const auto top = climb(crystal, surface, rays_from(darts), -stick_mm / 4, face + params.reach_mm, step, context);
   // Inside the shell a column would add nothing; climbing the complement finds where one would leave the lumen.
-  const auto exit = climb(complement(lumen), frame, rays_from(darts), 0, face + params.reach_mm, step, context);
+  const auto exit = climb(complement(lumen), surface, rays_from(darts), 0, face + params.reach_mm, step, context);
   std::vector<Vec2d> standing, failed;
   for (std::size_t k = 0; k < darts.size(); ++k) {
     // A column beside a stick that reaches the layer, or beside a place just tried in vain, would bring nothing.
@@ -152,8 +158,7 @@ SupportColumns support_columns(const Layer& layer, const Frame& frame, const Sha
       continue;
     }
     standing.push_back(darts[k]);
-    result.columns.push_back({frame.to_world({darts[k].x, darts[k].y, 0}),
-                              frame.to_world({darts[k].x, darts[k].y, *top[k]}), params.column_mm / 2});
+    result.columns.push_back({surface.at(darts[k]), surface.at(darts[k], *top[k]), params.column_mm / 2});
   }
   return result;
 }

@@ -80,6 +80,50 @@ TEST(Interfaces, ARoundSectionHasTheAreaOfItsCircle) {
   EXPECT_NEAR(found[0].frame.z.z, 1, 1e-12) << "from a into b";
 }
 
+/// A bowl through a bar of 12 x 10 mm: labels 0 below, 1 above it.
+TEST(Interfaces, ABentSectionHasTheAreaOfItsSurfaceAndTheTractionOfItsNormals) {
+  Cut cut = cut_at_origin(0, 1, 9);
+  cut.frame.origin = {};
+  cut.bend = {.slope = {}, .xx = 0.03, .xy = 0, .yy = 0.03};
+  const double clamp = 3;
+  LabelSamples samples{.origin = {-20, -20, -20},
+                       .voxel_mm = 0.8,
+                       .size = {51, 51, 51},
+                       .count = 2,
+                       .clamp_mm = clamp,
+                       .label = {},
+                       .near = {}};
+  for (int k = 0; k < 51; ++k)
+    for (int j = 0; j < 51; ++j)
+      for (int i = 0; i < 51; ++i) {
+        const double above = cut.surface().foot(samples.origin + 0.8 * Vec3d{i + 0.0, j + 0.0, k + 0.0}).above_mm;
+        samples.label.push_back(above < 0 ? 0 : 1);
+        if (std::abs(above) < clamp)
+          samples.near.push_back(
+              {static_cast<std::int64_t>(samples.label.size()) - 1, 0, 1, static_cast<float>(std::abs(above))});
+      }
+  const Shape bar = cuboid({{-6, -5, -15}, {6, 5, 15}});
+  const Parts parts = parts_of({Kind::Bulk, Kind::Bulk}, make_labels(samples), {cut});
+  const std::vector<Interface> found = interfaces(parts, bar, 0.1);
+  ASSERT_EQ(found.size(), 1U);
+  double area = 0, upward = 0;
+  for (double y = -4.99; y < 5; y += 0.02)
+    for (double x = -5.99; x < 6; x += 0.02) {
+      area += 4e-4 * cut.bend.stretch({x, y});
+      upward += 4e-4;  // of the surface, seen along z
+    }
+  EXPECT_NEAR(found[0].area_mm2, area, 0.02 * area);
+  EXPECT_NEAR(norm(found[0].frame.origin), 0, 0.1);
+  // Pulled along z by 2 MPa: through whatever surface, the same force.
+  const double force = demand_n(found[0], parts.labels, bar, [](Vec3d, Vec3d n) { return 2 * n.z; });
+  EXPECT_NEAR(force, 2 * upward, 0.03 * 2 * upward);
+  const std::vector<Interface> turned = interfaces(parts_of({Kind::Bulk, Kind::Column}, parts.labels, {cut}), bar, 0.1);
+  ASSERT_EQ(turned.size(), 1U);
+  EXPECT_EQ(turned[0].a, 1);
+  EXPECT_NEAR(turned[0].area_mm2, found[0].area_mm2, 1e-3 * area);
+  EXPECT_NEAR(turned[0].bend.xx, -0.03, 1e-12);
+}
+
 TEST(Interfaces, TheDemandIsTheIntegralOfTheTraction) {
   const Parts parts =
       parts_of({Kind::Column, Kind::Bulk}, halves([](double) { return 1; }, 2), {cut_at_origin(0, 1, 8)});

@@ -345,6 +345,118 @@ TEST(Joint, BoundsHold) {
   }
 }
 
+// --- bent
+// -----------------------------------------------------------------------------------------------------------------
+
+/// The round interface as a bowl, or a saddle.
+Interface bent_interface(double across = 1) {
+  Interface interface = round_interface();
+  interface.bend = {.slope = {0.1, 0}, .xx = 0.5 / 15, .xy = 0, .yy = across * 0.5 / 15};
+  return interface;
+}
+Joint bent_joint(const Interface& interface) {
+  return join(interface, wall({1, 0, 0}, 3), crystal({}), false, true, TcsParams{}.stick_mm, body, shell, 1, 0, {});
+}
+
+TEST(BentJoint, TheLayerHasItsThicknessAlongTheNormalsAndThePatternOfItsFeet) {
+  const Shape pattern = unite({wall({1, 0, 0}, 1), wall({0, 1, 0}, 1)});
+  for (const double across : {1.0, -1.0}) {
+    const Interface interface = bent_interface(across);
+    const Joint joint = join(interface, pattern, nothing(), false, false, 0, body, shell, 1, 0, {});
+    Random random(1, "test");
+    int compared = 0, inside = 0;
+    for (int i = 0; i < 8000; ++i) {
+      const Vec2d at{20 * random.uniform() - 10, 20 * random.uniform() - 10};
+      const double above = 3 * random.uniform() - 1.5;
+      const Vec3d foot = interface.surface().at(at), p = interface.surface().at(at, above);
+      const double expected =
+          std::max(std::abs(above) - 0.6, static_cast<double>(std::min(pattern(foot), -(body(foot) + 1))));
+      if (body(p) > -0.05 || body(foot) > -0.05 || std::abs(expected) < 0.03) continue;
+      ++compared;
+      inside += expected < 0 ? 1 : 0;
+      EXPECT_EQ(joint.shape(p) < 0, expected < 0) << p.x << " " << p.y << " " << p.z;
+    }
+    EXPECT_GT(compared, 3000);
+    EXPECT_GT(inside, 500);
+  }
+}
+
+TEST(BentJoint, NearItTheDistanceIsThatByBruteForce) {
+  // All material: a bowl 1.2 mm thick, far from its rim.
+  const Interface interface = bent_interface();
+  const Joint joint = join(interface, everything(), everything(), false, false, 0, body, shell, 1, 0, {});
+  Random random(2, "test");
+  for (int i = 0; i < 200; ++i) {
+    const Vec2d at{6 * random.uniform() - 3, 6 * random.uniform() - 3};
+    const double above = 1.6 * random.uniform() - 0.8;
+    // Inside, the image says no more than so deep.
+    const double expected = std::abs(above) - 0.6;
+    EXPECT_NEAR(joint.shape(interface.surface().at(at, above)), expected, 2e-3);
+  }
+}
+
+TEST(BentJoint, ColumnsStandSquareOnTheLayerAndEndInCrystal) {
+  const Interface interface = bent_interface();
+  const Joint joint = bent_joint(interface);
+  const Shape diamond = crystal({});
+  EXPECT_GE(joint.columns.size(), 4U);
+  for (const Capsule& c : joint.columns) {
+    EXPECT_NEAR(interface.surface().flattened(c.a).z, 0, 1e-9);
+    EXPECT_NEAR(dot(normalized(c.b - c.a), interface.surface().normal({c.a.x, c.a.y})), 1, 1e-9);
+    EXPECT_LE(diamond(c.b), -TcsParams{}.stick_mm / 4 + 1e-4);
+    EXPECT_LT(body(c.b), -shell + 1e-3);
+  }
+  EXPECT_EQ(joint.layer.regions_after, 1);
+  EXPECT_GT(joint.contact_area_mm2, 0);
+}
+
+TEST(BentJoint, TheShellsRingHasTheAreaAlongTheSurface) {
+  Interface interface = bent_interface();
+  interface.bend.slope = {};
+  const Layer layer = transient_layer(interface, nothing(), nothing(), body, shell, pixel, {});
+  const auto cap = [](double r) { return 2 * pi * 225 / 3 * (std::pow(1 + r * r / 225, 1.5) - 1); };
+  const double ring = cap(radius) - cap(radius - shell);
+  EXPECT_NEAR(layer.shell_area_mm2, ring, 0.01 * ring);
+}
+
+TEST(BentJoint, BoundsHoldAndTheValueChangesNoFasterThanItSays) {
+  for (const double across : {1.0, -1.0}) {
+    const Joint joint = bent_joint(bent_interface(across));
+    Random random(4, "test");
+    double fastest = 0;
+    for (int i = 0; i < 600; ++i) {
+      const Vec3d low{24 * random.uniform() - 12, 24 * random.uniform() - 12, 16 * random.uniform() - 8};
+      const double side = 0.1 + 3 * random.uniform();
+      const Interval bound = joint.shape.bound({low, low + Vec3d{side, side, side}});
+      for (int k = 0; k < 20; ++k) {
+        const Vec3d p = low + side * Vec3d{random.uniform(), random.uniform(), random.uniform()};
+        const float value = joint.shape(p);
+        EXPECT_GE(value, bound.lo);
+        EXPECT_LE(value, bound.hi);
+        const Vec3d step = 0.02 * normalized({random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5});
+        fastest = std::max(fastest, static_cast<double>(std::abs(joint.shape(p + step) - value)) / 0.02);
+      }
+    }
+    EXPECT_LE(fastest, joint.shape.lipschitz());
+    EXPECT_LE(joint.shape.lipschitz(), 2) << "a bound as loose as this tells next to nothing";
+  }
+}
+
+TEST(BentJoint, ABendOfNextToNothingIsThePlane) {
+  Interface bent = round_interface();
+  bent.bend.xx = 1e-12;
+  const Joint plane = bent_joint(round_interface()), other = bent_joint(bent);
+  EXPECT_EQ(plane.layer.solid.pixels, other.layer.solid.pixels);
+  EXPECT_EQ(plane.columns.size(), other.columns.size());
+  EXPECT_NEAR(plane.contact_area_mm2, other.contact_area_mm2, 1e-6);
+  Random random(5, "test");
+  for (int i = 0; i < 400; ++i) {
+    const Vec3d p{20 * random.uniform() - 10, 20 * random.uniform() - 10, 2 * random.uniform() - 1};
+    if (std::hypot(p.x, p.y) > 9.5) continue;
+    EXPECT_NEAR(plane.shape(p), other.shape(p), 1e-4);
+  }
+}
+
 TEST(Joint, SameSeedSameColumnsOnAnyNumberOfThreads) {
   const Joint two = crystal_joint();
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);

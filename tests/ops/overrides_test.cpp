@@ -31,7 +31,8 @@ Mesh block(Vec3d size) {
 TEST(Overrides, RecipeRoundTrip) {
   const Recipe given = parse_recipe(R"({"partition": {"overrides": {
       "parts": [{"id": 2, "infill": "solid"}, {"id": 0, "infill": "mfs"}],
-      "cuts": [{"point_mm": [1, 2, 3], "normal": [0, 0, 2]}],
+      "cuts": [{"point_mm": [1, 2, 3], "normal": [0, 0, 2]},
+               {"point_mm": [1, 2, 3], "normal": [0, 0, 2], "radius_mm": -20}],
       "solid": [{"box_mm": [[0, 0, 0], [1, 2, 3]]},
                 {"cylinder": {"from_mm": [0, 0, 0], "to_mm": [0, 0, 9], "diameter_mm": 4}}]}}})",
                                     Recipe{}, "test");
@@ -40,6 +41,8 @@ TEST(Overrides, RecipeRoundTrip) {
   EXPECT_EQ(o.parts[0].id, 2);
   EXPECT_EQ(o.parts[0].infill, PartInfill::Solid);
   EXPECT_EQ(o.cuts.at(0).point_mm, (Vec3d{1, 2, 3}));
+  EXPECT_EQ(o.cuts.at(0).radius_mm, 0);
+  EXPECT_EQ(o.cuts.at(1).radius_mm, -20);
   EXPECT_EQ(std::get<Cylinder>(o.solid.at(1)).diameter_mm, 4);
   EXPECT_EQ(to_json(parse_recipe(to_json(given), Recipe{}, "again")), to_json(given));
 }
@@ -107,6 +110,38 @@ TEST(Overrides, ACutPartsABarWhereItIsGiven) {
   EXPECT_NE(refusal([&] {
               (void)hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
             }).find("overrides.cuts[0]"),
+            std::string::npos);
+}
+
+/// A paraboloid of radius 25 mm whose lowest point is at x = 20 and that opens towards x = 60: over a square of 20 x 20
+/// mm it rises by (20^2 + 20^2) / 12 / (2 * 25) = 1.333 mm in the mean.
+TEST(Overrides, ABowlPartsABarAndIsJoinedAlongItsNormals) {
+  Recipe recipe = sturdy();
+  recipe.partition.overrides.cuts = {{{20, 10, 10}, {1, 0, 0}, 25}};
+  recipe.verify.triangles = 1000;
+  const testing::Outcome out = hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
+  ASSERT_EQ(out.report.parts.size(), 2U);
+  const double before = (20 + 800.0 / 12 / 50) * 400;
+  EXPECT_NEAR(out.report.parts[1].volume_mm3, before, 0.01 * before);
+  EXPECT_NEAR(out.report.parts[0].volume_mm3, 60 * 400 - before, 0.01 * (60 * 400 - before));
+  ASSERT_EQ(out.report.interfaces.size(), 1U);
+  const InterfaceReport& joint = out.report.interfaces[0];
+  EXPECT_TRUE(joint.bent);
+  double area = 0;
+  for (double y = -9.95; y < 10; y += 0.1)
+    for (double x = -9.95; x < 10; x += 0.1) area += 0.01 * std::sqrt(1 + (x * x + y * y) / 625);
+  EXPECT_NEAR(joint.area_mm2, area, 0.02 * area);
+  EXPECT_EQ(joint.regions_after, 1);
+  EXPECT_GT(joint.contact_area_mm2, 0);
+  EXPECT_GT(joint.columns, 0);
+  EXPECT_EQ(out.report.solid.pieces, 1);
+  EXPECT_EQ(out.report.solid.dangling, 0);
+  EXPECT_EQ(out.report.solid.unreached, 0);
+
+  recipe.partition.overrides.cuts[0].radius_mm = 10;
+  EXPECT_NE(refusal([&] {
+              (void)hybridized(block({60, 20, 20}), {.recipe = recipe, .voxel_mm = 0.5});
+            }).find("bent too much"),
             std::string::npos);
 }
 
@@ -260,6 +295,24 @@ TEST_P(RandomParts, OfABoxAreAlwaysOnePiece) {
 }
 
 INSTANTIATE_TEST_SUITE_P(TwoToEight, RandomParts, ::testing::Range(2, 9));
+
+/// Bowls that open to either side cross each other and a plane.
+TEST(Overrides, BowlsThatCrossAreJoinedAtEveryBorder) {
+  Recipe recipe = sturdy();
+  recipe.verify.triangles = 1000;
+  recipe.partition.overrides.cuts = {
+      {{18, 15, 13}, {1, 0.3, 0}, 40}, {{18, 15, 13}, {0, 1, 0.2}, -35}, {{18, 15, 17}, {0, 0.1, 1}}};
+  const Report report = hybridized(block({36, 30, 26}), {.recipe = recipe, .voxel_mm = 0.5}).report;
+  EXPECT_EQ(report.parts.size(), 8U);
+  EXPECT_EQ(report.solid.pieces, 1);
+  EXPECT_EQ(report.solid.dangling, 0);
+  EXPECT_EQ(report.solid.unreached, 0);
+  EXPECT_GE(report.interfaces.size(), 12U) << "of a box cut three times";
+  for (const InterfaceReport& i : report.interfaces) {
+    EXPECT_EQ(i.regions_after, 1) << "parts " << i.a << " and " << i.b;
+    EXPECT_GT(i.contact_area_mm2, 0) << "parts " << i.a << " and " << i.b << ", " << i.area_mm2 << " mm2";
+  }
+}
 
 }  // namespace
 }  // namespace fibrolite

@@ -30,6 +30,9 @@ struct Overrides {
   };
   struct Plane {
     Vec3d point_mm{}, normal{};  ///< In the body or within a voxel of the proxy of it; any length above zero.
+    /// Other than 0: bent like a bowl (a paraboloid), with this radius of curvature at the point; it opens to where the
+    /// normal points, below 0 to the other side. Not less than the section's own radius.
+    double radius_mm = 0;
   };
   std::vector<PartChoice> parts;  ///< Each at most once.
   /// If there are any, the body is parted here and nowhere else: at the connected section through each point.
@@ -37,7 +40,7 @@ struct Overrides {
   std::vector<KeptRegion> solid;  ///< Stays filled, as around a screw hole.
 };
 /// @throws Error BadRecipe, naming the entry: an empty box, a cylinder without length or diameter, a normal of no
-/// length, a part named twice.
+/// length, a radius that is no number, a part named twice.
 void check_overrides(const Overrides& overrides);
 /// The regions that stay filled, as one shape; nothing() if there are none.
 [[nodiscard]] Shape kept_solid(const Overrides& overrides);

@@ -8,19 +8,23 @@
 #include <vector>
 
 #include "fibrolite/context.h"
+#include "fibrolite/ops/bent_plane.h"
 #include "fibrolite/ops/diameter.h"
 #include "fibrolite/ops/overrides.h"
 #include "fibrolite/shape.h"
 
 namespace fibrolite {
 
-/// A plane cut between two candidates: a disc in the xy plane of `frame`, whose z axis points from `a` into `b`.
+/// A cut between two candidates: a disc in the xy plane of `frame`, whose z axis points from `a` into `b`; or what lies
+/// over that disc of a bent plane.
 struct Cut {
   int a = 0, b = 0;
   Frame frame;
   double radius_mm = 0;  ///< Of the disc about frame.origin that covers the section.
   bool kept = false;     ///< The user's own: stays, even between two bulk parts.
   bool shared = false;   ///< Other pairs meet in the same section: it counts only where a lies beside b.
+  Bend bend{};
+  [[nodiscard]] BentPlane surface() const { return {frame, bend}; }
 };
 
 /// A straight core cut out of a candidate: a cylinder about the z axis of `frame`, from its origin. Its ends lie beyond

@@ -31,7 +31,8 @@ struct PartReport {
 struct InterfaceReport {
   int a = 0, b = 0;
   Vec3d centroid_mm{}, normal{};  ///< Of a mantle: its axis.
-  double radius_mm = 0;           ///< Of the mantle of a core; 0: a plane.
+  double radius_mm = 0;           ///< Of the mantle of a core; else 0.
+  bool bent = false;              ///< No plane, and no mantle.
   double area_mm2 = 0;
   int regions_before = 0, regions_after = 0, columns = 0, columns_dropped = 0;
   double layer_area_mm2 = 0, union_area_mm2 = 0, bridge_area_mm2 = 0, contact_area_mm2 = 0;
