@@ -16,6 +16,8 @@ constexpr double clean_area = 3;         // a section larger than this many disc
 constexpr std::size_t least_links = 12;  // between two pieces; fewer are where cuts cross
 constexpr double least_purity = 0.5;     // of a piece: the share that a thin region fills
 
+const char* const no_piece = "no plane parts it from the rest, or what it parts is below partition.min_area";
+
 int most_frequent(const std::vector<std::int32_t>& samples, const std::vector<std::int32_t>& of) {
   std::map<int, std::size_t> votes;
   for (const std::int32_t s : samples) ++votes[of[static_cast<std::size_t>(s)]];
@@ -105,12 +107,12 @@ Verdict judge(const Anatomy& anatomy, const CutPieces& pieces, const std::vector
   for (const std::int32_t s : samples) here += pieces.of[static_cast<std::size_t>(s)] == v.piece ? 1 : 0;
   const double purity = static_cast<double>(here) / static_cast<double>(size[p]);
   if (purity < least_purity) {
-    v.why_not = "no plane cuts it off";
+    v.why_not = no_piece;
     return v;
   }
   const LimbPiece piece = pieces.piece(anatomy, v.piece);
   if (piece.faces.empty()) {
-    v.why_not = "no plane cuts it off";
+    v.why_not = no_piece;
     return v;
   }
   const QuickShape shape = quick_shape(anatomy.body, pieces.links, piece);

@@ -105,6 +105,9 @@ TEST(Report, AMantleHasNoBridges) {
   const json plane = json::parse(to_json(report))["interfaces"][0];
   EXPECT_EQ(plane["border"], "plane");
   EXPECT_EQ(plane["bridge_mm3"], json({{"mst", 1.5}, {"bbox", 4.0}}));
+  interface.bent = true;
+  EXPECT_EQ(json::parse(to_json(report))["interfaces"][0]["border"], "bent");
+  interface.bent = false;
   interface.radius_mm = 6;
   interface.mst_bridge_mm3 = interface.bbox_bridge_mm3 = std::numeric_limits<double>::quiet_NaN();
   const json mantle = json::parse(to_json(report))["interfaces"][0];
