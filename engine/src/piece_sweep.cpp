@@ -2,6 +2,7 @@
 #include "fibrolite/piece_sweep.h"
 
 #include <openvdb/openvdb.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -180,10 +181,11 @@ struct PieceSweep::Impl {
       const Id id = number.at(one.id);
       if (one.inside && !sets[id].held && one.voxels <= most) all.push_back({id, one.first});
     }
+    tbb::enumerable_thread_specific<Depth> depths([&] { return Depth(solid, params.skin_mm, &range); });
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
       if (context.cancelled()) return;
       Open& mine = all[i];
-      Depth depth(solid, params.skin_mm, &range);
+      Depth& depth = depths.local();
       openvdb::MaskTree seen;
       seen.setValueOn(mine.from);
       std::vector<Coord> samples{mine.from};
