@@ -5,6 +5,8 @@
 // With --band: the first half of it only, beside our own with the same band, and with 1 mm more of it inside; the best
 // of three each, by turns.
 //   fibrolite-floor MODEL SIZE_MM VOXEL_MM --band
+// With --eager: the whole of the preset peer-tcs by grids and OpenVDB's tools, one after the other (eager.h).
+//   fibrolite-floor MODEL SIZE_MM VOXEL_MM --eager
 // Back from a solid that Fibrolite made to a mesh, beside our own; the best of three each, by turns.
 //   fibrolite-floor SOLID.vdb --mesh
 // And what memory gives: how fast all cores together copy arrays that no cache holds.
@@ -27,6 +29,7 @@
 #include <string_view>
 #include <vector>
 
+#include "eager.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/prepare.h"
 #include "fibrolite/solid_io.h"
@@ -132,8 +135,10 @@ int main(int argc, char** argv) try {
     return compare_meshes(argv[1]);
   }
   const bool band = argc == 5 && std::string_view(argv[4]) == "--band";
-  if (argc != 4 && !band) {
-    std::cerr << "usage: fibrolite-floor MODEL SIZE_MM VOXEL_MM [--band]\n       fibrolite-floor SOLID.vdb --mesh\n    "
+  const bool eager = argc == 5 && std::string_view(argv[4]) == "--eager";
+  if (argc != 4 && !band && !eager) {
+    std::cerr << "usage: fibrolite-floor MODEL SIZE_MM VOXEL_MM [--band | --eager]\n       fibrolite-floor SOLID.vdb "
+                 "--mesh\n    "
                  "   fibrolite-floor --copy\n";
     return 2;
   }
@@ -146,6 +151,17 @@ int main(int argc, char** argv) try {
   for (const auto& t : model.mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
   openvdb::initialize();
   if (band) return compare_bands(model.mesh, std::atof(argv[3]), points, triangles);
+  if (eager) {
+    const fibrolite::bench::Eager made = fibrolite::bench::eager_csg(points, triangles, std::atof(argv[3]));
+    std::cout << nlohmann::json{{"eager_s", made.wall_s},
+                                {"eager_cpu_s", made.cpu_s},
+                                {"offset_s", made.offset_s},
+                                {"volume_mm3", made.volume_mm3},
+                                {"triangles", made.triangles}}
+                     .dump()
+              << '\n';
+    return 0;
+  }
 
   const double from = wall_s(), cpu_from = cpu_s();
   const auto transform = openvdb::math::Transform::createLinearTransform(std::atof(argv[3]));

@@ -36,13 +36,16 @@ std::string first_line(const fs::path& log) {
   return line;
 }
 
-Run measure_band(const Case& c, const Options& options) {
+Run measure_floor(const Case& c, const Options& options) {
   Run run;
   const fs::path log = options.out / "log.txt";
   run.floor = fibrolite::bench::run(
-      {options.bin / "fibrolite-floor", c.model, std::to_string(c.size_mm), std::to_string(c.voxel_mm), "--band"}, log);
+      {options.bin / "fibrolite-floor", c.model, std::to_string(c.size_mm), std::to_string(c.voxel_mm), c.floor_option},
+      log);
   if (run.floor.exit_code != 0) {
     run.failure = "floor: exit " + std::to_string(run.floor.exit_code) + ": " + first_line(log);
+  } else if (c.floor_option == "--eager") {
+    read_eager(run, nlohmann::json::parse(run.floor.output));
   } else {
     read_band(run, nlohmann::json::parse(run.floor.output));
   }
@@ -50,7 +53,7 @@ Run measure_band(const Case& c, const Options& options) {
 }
 
 Run measure(const Case& c, const Options& options) {
-  if (c.band) return measure_band(c, options);
+  if (!c.floor_option.empty()) return measure_floor(c, options);
   const fs::path solid = options.out / "solid.stl", report = options.out / "report.json", log = options.out / "log.txt";
   std::vector<std::string> command{options.bin / "fibrolite",
                                    "generate",

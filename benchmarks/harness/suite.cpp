@@ -114,8 +114,14 @@ std::vector<Case> suite(const SuiteParams& params) {
                        .model = main_model,
                        .voxel_mm = voxel_mm,
                        .goals = {.band_speed_up = voxel_mm < 0.2 ? 5 : 3, .wide_times = 1.5},
-                       .band = true});
+                       .floor_option = "--band"});
     }
+    cases.push_back({.name = "eager 0.1",
+                     .model = main_model,
+                     .voxel_mm = 0.1,
+                     .goals = {.eager_times = 8},
+                     .beside = peer.name,
+                     .floor_option = "--eager"});
     cases.push_back({.name = "tcs 0.1", .model = main_model, .voxel_mm = 0.1, .infill = "tcs", .goals = {}});
     cases.push_back({.name = "hybrid 0.1",
                      .model = main_model,

@@ -23,6 +23,7 @@ struct Goals {
   std::optional<double> compute_times{};  ///< Wall time of the compute stages, those that decide the parts left out.
   std::optional<double> peak_times{};     ///< Peak memory.
   std::optional<double> speed_up{};       ///< At least: wall time of `realize` and `surface` here over theirs there.
+  std::optional<double> eager_times{};    ///< At least: OpenVDB's tools' wall time over the compute stages there.
   // Of fibrolite-floor --band:
   std::optional<double> band_speed_up{};  ///< At least: meshToLevelSet's wall time over to_solid()'s.
   std::optional<double> wide_times{};     ///< Wall time of to_solid() with 1 mm inside over that with the band alone.
@@ -39,7 +40,9 @@ struct Case {
   std::string beside{};            ///< An earlier case to compare with.
   std::string max_memory{};        ///< As `--max-memory` takes it.
   int threads = 0;                 ///< 0: as all the others.
-  bool band = false;               ///< Not the program: the model to its band and back, beside OpenVDB's.
+  /// Not the program, but fibrolite-floor with this option: "--band" (the model to its band, beside OpenVDB's) or
+  /// "--eager" (all of it by OpenVDB's tools, beside an earlier case).
+  std::string floor_option{};
 };
 struct SuiteParams {
   std::filesystem::path assets;                 ///< Bundled models, .ply.

@@ -63,6 +63,12 @@ void read_band(Run& run, const nlohmann::json& band) {
   run.active_voxels = band.at("band_voxels");
 }
 
+void read_eager(Run& run, const nlohmann::json& eager) {
+  run.eager_s = eager.at("eager_s");
+  run.offset_s = eager.at("offset_s");
+  run.triangles = eager.at("triangles");
+}
+
 void print_head() {
   std::printf("%-14s %-18s %6s %6s | %7s %7s %7s %7s | %7s %8s %8s | %8s %7s %7s %7s\n", "case", "model", "size",
               "voxel", "wall s", "CPU s", "compute", "files", "peak MB", "M voxels", "M tris", "floor s", "x floor",
@@ -91,7 +97,10 @@ void print_row(const Case& c, const Run& run) {
                 run.failure.c_str());
     return;
   }
-  if (c.band) {
+  if (run.eager_s > 0) {
+    std::printf("%-14s %-18s %6g %6g | OpenVDB's tools %.2f s, of which the shell's offset %.2f s; peak %.0f MB\n",
+                c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.eager_s, run.offset_s, run.floor.peak_rss_mb);
+  } else if (run.band_s > 0) {
     std::printf("%-14s %-18s %6g %6g | meshToLevelSet %.2f s, to_solid %.2f s, with 1 mm inside %.2f s\n",
                 c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.level_set_s, run.band_s, run.wide_s);
   } else {
@@ -123,7 +132,9 @@ std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
   one("partition and verification s", c.goals.partition_s, run.partition_s);
   one("peak MB", c.goals.peak_rss_mb, run.program.peak_rss_mb);
   one("joints / all stages, CPU", c.goals.joints_share, run.joints_share);
-  if (run.beside_cpu_s > 0) {
+  if (run.beside_cpu_s > 0 && run.eager_s > 0)
+    at_least("OpenVDB's tools / " + c.beside, c.goals.eager_times, run.eager_s / run.beside_compute_s);
+  else if (run.beside_cpu_s > 0) {
     const std::string over = " / " + c.beside;
     one(("compute CPU" + over).c_str(), c.goals.cpu_times, run.compute_cpu_s / run.beside_cpu_s);
     one(("realize CPU per voxel" + over).c_str(), c.goals.realize_times, run.realize_per_voxel() / run.beside_realize);
@@ -152,8 +163,11 @@ nlohmann::json to_json(const Case& c, const Run& run) {
     return json;
   }
   json["threads"] = c.threads;
-  if (c.band) {
-    json["band"] = {{"level_set_s", run.level_set_s}, {"band_s", run.band_s}, {"wide_band_s", run.wide_s}};
+  if (!c.floor_option.empty()) {
+    if (run.eager_s > 0)
+      json["eager"] = {{"eager_s", run.eager_s}, {"offset_s", run.offset_s}, {"peak_rss_mb", run.floor.peak_rss_mb}};
+    else
+      json["band"] = {{"level_set_s", run.level_set_s}, {"band_s", run.band_s}, {"wide_band_s", run.wide_s}};
     bool met = true;
     json["goals"] = judge(c, run, met);
     json["met"] = met;

@@ -27,7 +27,8 @@ struct Run {
   double active_voxels = 0, triangles = 0;
   double floor_compute_s = 0, floor_compute_cpu_s = 0;
   double parallel_s = 0;                           ///< Wall time of `realize` and `surface`.
-  double level_set_s = 0, band_s = 0, wide_s = 0;  ///< Of a case that is a band.
+  double level_set_s = 0, band_s = 0, wide_s = 0;  ///< Of fibrolite-floor --band.
+  double eager_s = 0, offset_s = 0;                ///< Of fibrolite-floor --eager; the shell's offset alone.
   // Of the case to compare with; 0: none was run.
   double beside_cpu_s = 0, beside_realize = 0, beside_checks = 0, beside_compute_s = 0, beside_parallel_s = 0,
          beside_peak_mb = 0;
@@ -44,6 +45,8 @@ void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& f
 
 /// The same of what `fibrolite-floor --band` says.
 void read_band(Run& run, const nlohmann::json& band);
+/// And of what `fibrolite-floor --eager` says.
+void read_eager(Run& run, const nlohmann::json& eager);
 
 void print_head();
 void print_row(const Case& c, const Run& run);
