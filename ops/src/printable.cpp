@@ -17,7 +17,7 @@ ScanLimits limits_of(const PrintParams& params, Vec3d up, double voxel_mm) {
     throw Error(Code::BadRecipe, "walls and gaps need a least width above 0", "print");
   if (!(params.overhang_deg >= 0 && params.overhang_deg <= 90))
     throw Error(Code::BadRecipe, "an overhang lies between 0 and 90 degrees", "print.overhang_deg");
-  const double tolerance = 0.25 * voxel_mm, steepest = std::min(params.overhang_deg + 5, 90.0);
+  const double tolerance = 0.25 * voxel_mm, steepest = std::min(params.overhang_deg + overhang_tolerance_deg, 90.0);
   return {.wall_mm = params.wall_mm - tolerance,
           .gap_mm = params.gap_mm - tolerance,
           .up = normalized(up),

@@ -195,7 +195,11 @@ Json to_json(const PrintReport& print) {
           {"small_gaps", to_json(print.found.small_gaps)},
           {"overhangs", overhangs},
           {"drains", array(print.drains)},
-          {"mended", {{"balls", print.thickened}, {"pillars", print.pillars}, {"voids_filled", print.voids_filled}}}};
+          {"mended",
+           {{"balls", print.thickened},
+            {"pillars", print.pillars},
+            {"crystal_stretched", print.stretched},
+            {"voids_filled", print.voids_filled}}}};
 }
 
 Json to_json(const PlateReport& plate) {

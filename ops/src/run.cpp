@@ -188,6 +188,14 @@ Shape printed_lumen(const Shape& body, double shell_mm) { return offset(body, -0
 
 namespace {
 
+/// Of the crystal as it is printed.
+double leaning_deg(const Recipe& recipe) {
+  TcsParams tcs = recipe.tcs;
+  tcs.up = recipe.verify.up;
+  return steepest_overhang_deg(tcs);
+}
+double steepest_deg(const PrintParams& limits) { return limits.overhang_deg + overhang_tolerance_deg; }
+
 /// All crystal, which says by itself how steep it is (TcsParams::stretch_z).
 Shape lattice(const Parts& parts, const std::vector<Fill>& fills) {
   std::vector<Shape> all;
@@ -197,6 +205,16 @@ Shape lattice(const Parts& parts, const std::vector<Fill>& fills) {
 }
 
 }  // namespace
+
+bool stretch_to_print(Recipe& recipe, InfillKind infill) {
+  const bool sticks = recipe.tcs.form != TcsForm::Sheet && (infill == InfillKind::Tcs || infill == InfillKind::Hybrid);
+  if (!sticks || recipe.tcs.stretch_z || leaning_deg(recipe) <= steepest_deg(recipe.print)) return false;
+  Recipe taller = recipe;
+  taller.tcs.stretch_z = true;
+  if (leaning_deg(taller) >= leaning_deg(recipe)) return false;
+  recipe = taller;
+  return true;
+}
 
 Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& parts, const std::vector<Fill>& fills,
                           const std::vector<Sticks>& sticks, const TieParams& ties, const Recipe& recipe, bool fix,
@@ -231,10 +249,12 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& part
   report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm(fills, limits), context);
   report.print.checked = true;
   const Printable& found = report.print.found;
-  if (fix && !recipe.tcs.stretch_z && found.overhangs.area_mm2 > 0.01 * found.lumen_mm2)
+  if (const double leaning = leaning_deg(recipe);
+      fix && !sticks.empty() && leaning > steepest_deg(limits) && found.overhangs.area_mm2 > 0.01 * found.lumen_mm2)
     report.warnings.push_back(
-        "the crystal's own sticks are flatter than print.overhang_deg allows, which --fix leaves: use --preset fdm or "
-        "--set tcs.stretch_z=true");
+        "the crystal's sticks lean " + number_text(leaning, 3) +
+        " degrees from upright, more than print.overhang_deg allows, which --fix leaves: make the "
+        "cell of tcs.cell_mm taller, or leave out tcs.rotate_deg");
   report.print.drains = out.drains;
   report.print.thickened = static_cast<std::int64_t>(out.thickened.size());
   report.print.pillars = static_cast<std::int64_t>(out.pillars.size());

@@ -93,6 +93,9 @@ struct Design {
 [[nodiscard]] double node_mm(const std::vector<Fill>& fills, const PrintParams& limits);
 /// Where gaps and steep faces matter to a printer.
 [[nodiscard]] Shape printed_lumen(const Shape& body, double shell_mm);
+/// What --fix does about overhangs before there is a solid: stretches a crystal whose bonds lean more than is printed
+/// without support, if that makes them steeper. Whether it did.
+[[nodiscard]] bool stretch_to_print(Recipe& recipe, InfillKind infill);
 /// The print checks, with what the recipe or `fix` asks for mended before them; into the report.
 [[nodiscard]] Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& parts,
                                         const std::vector<Fill>& fills, const std::vector<Sticks>& sticks,

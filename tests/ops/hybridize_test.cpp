@@ -245,6 +245,27 @@ TEST(Hybridize, the_crystal_of_the_preset_fdm_stands_the_way_it_is_printed) {
   EXPECT_NEAR(across.solid.volume_mm3 / upright.solid.volume_mm3, 1, 0.02);
 }
 
+TEST(Hybridize, fix_stretches_a_crystal_that_leans_too_far) {
+  const Mesh mesh = model("rounded_box");
+  const auto made = [&](bool fix, double overhang_deg) {
+    HybridizeParams params{.recipe = sturdy(), .infill = InfillKind::Tcs, .voxel_mm = 0.4, .fix = fix};
+    params.recipe.print.overhang_deg = overhang_deg;
+    return hybridized(mesh, params).report;
+  };
+  const auto share = [](const Report& report) {
+    return report.print.found.overhangs.area_mm2 / report.print.found.lumen_mm2;
+  };
+  const Report left = made(false, 45), fixed = made(true, 45), patient = made(true, 60);
+  EXPECT_FALSE(left.print.stretched);
+  EXPECT_GT(share(left), 0.05);
+  EXPECT_TRUE(fixed.print.stretched);
+  EXPECT_LT(share(fixed), 0.01);
+  EXPECT_FALSE(fixed.recipe.tcs.stretch_z) << "the recipe stays what was asked for";
+  EXPECT_FALSE(patient.print.stretched) << "as it stands it can be printed";
+  EXPECT_EQ(fixed.solid.pieces, 1);
+  EXPECT_EQ(fixed.solid.dangling, 0);
+}
+
 TEST(Hybridize, the_steps_united_by_openvdb_are_the_fused_solid) {
   const Outcome out = hybridized(model("cylinder_on_box"), {.recipe = sturdy(), .voxel_mm = 0.5, .steps = true});
   std::map<std::string, Solid> step;

@@ -117,6 +117,22 @@ Frame lattice(const TcsParams& p) {
   return {p.shift_mm, turned(stands.x), turned(stands.y), turned(stands.z)};
 }
 
+}  // namespace
+
+double steepest_overhang_deg(const TcsParams& params) {
+  const CellEdges cell = cell_of(params);
+  const Frame axes = lattice(params);
+  const Vec3d up = normalized(params.up);
+  double least = 1;
+  for (const Vec3d s : {Vec3d{1, 1, 1}, Vec3d{1, -1, -1}, Vec3d{-1, 1, -1}, Vec3d{-1, -1, 1}}) {
+    const Vec3d bond = normalized(s.x * cell.x * axes.x + s.y * cell.y * axes.y + s.z * cell.z * axes.z);
+    least = std::min(least, std::abs(dot(bond, up)));
+  }
+  return std::acos(least) * 180 / std::numbers::pi;
+}
+
+namespace {
+
 bool is_turned(const TcsParams& p) { return !(p.rotate_deg == Vec3d{}) || (p.stretch_z && !(p.up == Vec3d{0, 0, 1})); }
 
 Shape in_lattice(const TcsParams& p, Vec3d shift) {

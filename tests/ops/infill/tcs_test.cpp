@@ -466,6 +466,21 @@ TEST(Overhang, stretched_sticks_lean_45_degrees_and_no_more_but_at_nodes) {
     EXPECT_NEAR(worst_overhang({.stretch_z = true, .up = up}, near), std::cos(pi / 4), 0.01);
 }
 
+TEST(Overhang, is_that_of_the_flattest_bond_as_printed) {
+  const double magic = std::acos(1 / std::sqrt(3.0)) * 180 / std::numbers::pi;
+  TcsParams params;
+  EXPECT_NEAR(steepest_overhang_deg(params), magic, 1e-9);
+  params.up = {0, -1, 0};
+  EXPECT_NEAR(steepest_overhang_deg(params), magic, 1e-9);
+  params.stretch_z = true;
+  EXPECT_NEAR(steepest_overhang_deg(params), 45, 1e-9) << "stands along up";
+  // Turned by 45 degrees about x, two bonds lie in the plate, stretched or not: (0, 1, 1) and (0, 1, -1) to the axes.
+  params = {.rotate_deg = {45, 0, 0}};
+  EXPECT_NEAR(steepest_overhang_deg(params), 90, 1e-9);
+  params = {.cell_mm = {6, 6, 18}};
+  EXPECT_NEAR(steepest_overhang_deg(params), std::atan(std::sqrt(2.0) / 3) * 180 / std::numbers::pi, 1e-9);
+}
+
 TEST(Crystal, bad_sizes_are_refused) {
   for (const TcsParams& p :
        {TcsParams{.stick_mm = 0}, TcsParams{.ball_mm = 0.5}, TcsParams{.cell_mm = 3}, TcsParams{.cell_mm = {6, 6, 19}},

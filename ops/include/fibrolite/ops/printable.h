@@ -21,6 +21,8 @@ struct PrintParams {
   bool check = true;  ///< Look for such places also if nothing is mended; a tenth to a fifth of a run at fine voxels.
 };
 inline constexpr double default_drain_mm = 2;
+/// What the lattice makes of a slope, degrees: a face counts as steep above overhang_deg and this.
+inline constexpr double overhang_tolerance_deg = 5;
 
 struct PrintPlace {
   Vec3d at_mm{};

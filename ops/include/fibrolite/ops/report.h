@@ -108,6 +108,7 @@ struct PrintReport {
   std::vector<Drain> drains;
   std::int64_t thickened = 0;     ///< Balls put into thin walls and small gaps.
   std::int64_t pillars = 0;       ///< Under overhangs.
+  bool stretched = false;         ///< The crystal, so that its sticks stand steeper (TcsParams::stretch_z).
   std::int64_t voids_filled = 0;  ///< Enclosed, too small for a hole.
 };
 /// The layers of one plate.

@@ -63,6 +63,10 @@ struct TcsParams {
 /// Each stick that may reach into the box, once, from node to node; others near the box too. Cost: O(cells in the box).
 void each_stick(const TcsParams& params, const Box3d& box, const std::function<void(const Capsule&)>& visit);
 
+/// How far the flattest of the crystal's bonds leans from upright, degrees: 54.7 for a cube along the axes, 45
+/// stretched.
+[[nodiscard]] double steepest_overhang_deg(const TcsParams& params);
+
 /// Share of the endless crystal, not graded, that is material, by integrating over a cell; within 0.5 %. Cost:
 /// milliseconds.
 [[nodiscard]] double density(const TcsParams& params);
