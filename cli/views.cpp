@@ -85,7 +85,8 @@ PictureParams picture_params(const std::string& text, const Hybrid& hybrid, cons
     const Interface& at = hybrid.interfaces[view.number];
     const Vec3d towards = view.back ? -at.frame.z : at.frame.z;
     // Just off the layer, so that it is seen with what stands on it.
-    params.cut_point = at.frame.origin + (0.5 * recipe.joint.layer_mm + 0.5 * recipe.joint.column_mm) * towards;
+    const JointParams joint = joint_params(recipe);
+    params.cut_point = at.frame.origin + (0.5 * joint.layer_mm + 0.5 * joint.column_mm) * towards;
     params.cut_normal = towards;
     params.focus_mm = 1.15 * at.radius_mm;
   }

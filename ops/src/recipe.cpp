@@ -66,9 +66,10 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   if (infill == InfillKind::Gyroid || gyroid_part)
     list.push_back({recipe.gyroid.density ? "gyroid.density" : "gyroid.wall_mm", sized(recipe.gyroid).wall_mm});
   if (hybrid && recipe.joint.enabled) {
-    list.push_back({"joint.layer_mm", recipe.joint.layer_mm});
-    if (recipe.joint.columns) list.push_back({"joint.column_mm", recipe.joint.column_mm});
-    list.push_back({"joint.min_wall_mm", recipe.joint.min_wall_mm});
+    const JointParams joint = joint_params(recipe);
+    list.push_back({"joint.layer_mm", joint.layer_mm});
+    if (joint.columns) list.push_back({"joint.column_mm", joint.column_mm});
+    list.push_back({"joint.min_wall_mm", joint.min_wall_mm});
   }
   return list;
 }
@@ -128,7 +129,7 @@ void check_joint(const JointParams& joint, double wall_mm) {
   const auto printable = [wall_mm](const char* key, double mm) {
     if (mm < wall_mm * rounding)
       unfit(std::string(key).append(" is ").append(number_text(mm)).append(" mm, thinner than print.wall_mm"), "recipe",
-            "use " + number_text(wall_mm) + " or more, or a smaller print.wall_mm");
+            "use " + number_text(wall_mm) + " or more, or a smaller print.wall_mm, or auto, which follows it");
   };
   printable("joint.layer_mm", joint.layer_mm);
   if (joint.columns) printable("joint.column_mm", joint.column_mm);
@@ -160,6 +161,27 @@ CoreParams core_params(const Recipe& recipe) {
           2 * (recipe.mfs.fibre_mm + recipe.mfs.wall_mm)};
 }
 
+JointParams joint_params(const Recipe& recipe) {
+  const JointRecipe& asked = recipe.joint;
+  JointParams joint{.enabled = asked.enabled, .columns = asked.columns, .bridge = asked.bridge};
+  const double wall_mm = recipe.print.wall_mm;
+  joint.layer_mm = asked.layer_mm.value_or(std::max(joint.layer_mm, wall_mm));
+  joint.column_mm = asked.column_mm.value_or(std::max(joint.column_mm, wall_mm));
+  joint.spacing_mm = asked.spacing_mm.value_or(std::max(joint.spacing_mm, 2 * joint.column_mm));
+  joint.reach_mm = asked.reach_mm;
+  joint.min_wall_mm = asked.min_wall_mm.value_or(std::max(joint.min_wall_mm, wall_mm));
+  return joint;
+}
+
+Recipe with_joint_lengths(Recipe recipe) {
+  const JointParams joint = joint_params(recipe);
+  recipe.joint.layer_mm = joint.layer_mm;
+  recipe.joint.column_mm = joint.column_mm;
+  recipe.joint.spacing_mm = joint.spacing_mm;
+  recipe.joint.min_wall_mm = joint.min_wall_mm;
+  return recipe;
+}
+
 double thinnest_mm(const Recipe& recipe, InfillKind infill) {
   double thinnest = std::numeric_limits<double>::infinity();
   for (const Feature& feature : features(recipe, infill)) thinnest = std::min(thinnest, feature.mm);
@@ -177,7 +199,7 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   if (hybrid && recipe.partition.by == PartBy::Load && !recipe.partition.overrides.cuts.empty())
     unfit("partition.overrides.cuts part by shape, but partition.by is load", "recipe", "use partition.by=both");
   if (infill == InfillKind::Gyroid) (void)density(recipe.gyroid);
-  if (hybrid && recipe.joint.enabled) check_joint(recipe.joint, recipe.print.wall_mm);
+  if (hybrid && recipe.joint.enabled) check_joint(joint_params(recipe), recipe.print.wall_mm);
 
   const double drain_mm = recipe.print.drain_mm.value_or(0);
   if (drain_mm > 0 && drain_mm < 2 * voxel_mm * rounding)

@@ -267,7 +267,7 @@ std::string to_json(const Report& report) {
       {"version", version()},
       {"command", report.command},
       {"infill", report.infill},
-      {"recipe", Json::parse(to_json(report.recipe))},
+      {"recipe", Json::parse(to_json(with_joint_lengths(report.recipe)))},
       {"model", to_json(report.model)},
       {"partition",
        {{"threshold", report.threshold}, {"stable_from", report.stable_from}, {"stable_to", report.stable_to}}},

@@ -161,7 +161,7 @@ std::vector<Joint> join_all(const Parts& parts, const std::vector<Interface>& in
       return infill_of(parts.parts[part], InfillKind::Hybrid) == PartInfill::Tcs;
     };
     joints.push_back(join(at, fills[a].shape, fills[b].shape, crystal(a), crystal(b), member, body,
-                          recipe.shell.thickness_mm, recipe.seed, static_cast<int>(i), recipe.joint, context));
+                          recipe.shell.thickness_mm, recipe.seed, static_cast<int>(i), joint_params(recipe), context));
     context.progress(static_cast<double>(i + 1) / static_cast<double>(interfaces.size()));
   }
   return joints;

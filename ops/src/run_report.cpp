@@ -70,6 +70,7 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
                    const std::vector<double>& demand_n, const Recipe& recipe, Report& report) {
+  const double layer_mm = joint_params(recipe).layer_mm;
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const Joint& joint = joints[i];
     InterfaceReport row;
@@ -86,9 +87,9 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
     row.columns_dropped = joint.columns_dropped;
     row.union_area_mm2 = joint.layer.union_area_mm2;
     row.bridge_area_mm2 = joint.layer.bridge_area_mm2;
-    row.mst_bridge_mm3 = row.bbox_bridge_mm3 = recipe.joint.layer_mm * joint.layer.bridge_area_mm2;
+    row.mst_bridge_mm3 = row.bbox_bridge_mm3 = layer_mm * joint.layer.bridge_area_mm2;
     (recipe.joint.bridge == Bridge::Mst ? row.bbox_bridge_mm3 : row.mst_bridge_mm3) =
-        recipe.joint.layer_mm * joint.layer.other_bridge_area_mm2;
+        layer_mm * joint.layer.other_bridge_area_mm2;
     // A sleeve is a wall all round, whatever the rule for bridges.
     if (row.radius_mm > 0) row.mst_bridge_mm3 = row.bbox_bridge_mm3 = std::numeric_limits<double>::quiet_NaN();
     row.layer_area_mm2 =

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "fibrolite/error.h"
 #include "fibrolite/ops/text.h"
@@ -408,12 +409,35 @@ TEST(CheckRecipe, WhatJointsAddIsNoThinnerThanTheMinimumWall) {
     EXPECT_EQ(refused(set(thin, "joint.enabled=false")), "");
     EXPECT_EQ(refused(thin, InfillKind::Tcs), "");
   }
-  // A wider wall asked for counts as well: columns and bridges of 0.8 mm, layers of 1.2 mm.
-  EXPECT_EQ(refused(set(Recipe{}, "print.wall_mm=0.8")), "");
-  EXPECT_THAT(refused(set(Recipe{}, "print.wall_mm=0.9")), HasSubstr("joint.column_mm is 0.8 mm"));
-  const Recipe alone = set(set(Recipe{}, "print.wall_mm=0.9"), "joint.columns=false");
+  // A wider wall asked for counts as well, against numbers of the user's own.
+  Recipe chosen = set(set(Recipe{}, "joint.column_mm=0.8"), "joint.min_wall_mm=0.8");
+  EXPECT_EQ(refused(set(chosen, "print.wall_mm=0.8")), "");
+  chosen = set(chosen, "print.wall_mm=0.9");
+  EXPECT_THAT(refused(chosen), HasSubstr("joint.column_mm is 0.8 mm"));
+  const Recipe alone = set(chosen, "joint.columns=false");
   EXPECT_THAT(refused(alone), HasSubstr("joint.min_wall_mm is 0.8 mm"));
   EXPECT_EQ(refused(set(alone, "joint.min_wall_mm=0.9")), "");
+}
+
+TEST(Recipe, LengthsOfJointsLeftOpenFollowTheWall) {
+  for (const auto& [wall, layer, column, spacing] :
+       {std::tuple{0.4, 1.2, 0.8, 3.0}, {1.0, 1.2, 1.0, 3.0}, {1.5, 1.5, 1.5, 3.0}, {2.0, 2.0, 2.0, 4.0}}) {
+    const Recipe recipe = set(Recipe{}, "print.wall_mm=" + number_text(wall));
+    const JointParams joint = joint_params(recipe);
+    EXPECT_EQ(joint.layer_mm, layer);
+    EXPECT_EQ(joint.column_mm, column);
+    EXPECT_EQ(joint.min_wall_mm, column);
+    EXPECT_EQ(joint.spacing_mm, spacing);
+    EXPECT_EQ(refusal([&] { check_recipe(recipe, 0); }), "") << wall;
+    EXPECT_EQ(to_json(with_joint_lengths(with_joint_lengths(recipe))), to_json(with_joint_lengths(recipe)));
+  }
+  // Whichever is said first.
+  const Recipe chosen = parse_recipe(R"({"joint": {"column_mm": 1.4}, "print": {"wall_mm": 1.1}})", Recipe{}, "x");
+  EXPECT_EQ(joint_params(chosen).column_mm, 1.4);
+  EXPECT_EQ(joint_params(chosen).min_wall_mm, 1.1);
+  EXPECT_EQ(joint_params(set(chosen, "joint.column_mm=auto")).column_mm, 1.1);
+  EXPECT_EQ(joint_params(set(chosen, "joint.column_mm=2")).spacing_mm, 4);  // columns do not touch
+  EXPECT_EQ(to_json(parse_recipe(to_json(chosen), Recipe{}, "printed")), to_json(chosen));
 }
 
 TEST(Recipe, ADrainIsAtLeastTwoVoxelsWideOrNone) {

@@ -146,7 +146,18 @@ TEST(Report, TheRecipeInItIsARecipe) {
   Report report;
   report.recipe = preset("paper");
   const std::string recipe = json::parse(to_json(report)).at("recipe").dump();
-  EXPECT_EQ(to_json(parse_recipe(recipe, Recipe{}, "report")), to_json(preset("paper")));
+  EXPECT_EQ(to_json(parse_recipe(recipe, Recipe{}, "report")), to_json(with_joint_lengths(preset("paper"))));
+}
+
+/// Lengths that follow others in the recipe are numbers in the report: those of the run.
+TEST(Report, RecordsTheLengthsOfJointsThatFollowedTheWall) {
+  Report report;
+  report.recipe.print.wall_mm = 1.0;
+  const json joint = json::parse(to_json(report)).at("recipe").at("joint");
+  EXPECT_EQ(joint.at("layer_mm"), 1.2);
+  EXPECT_EQ(joint.at("column_mm"), 1.0);
+  EXPECT_EQ(joint.at("spacing_mm"), 3.0);
+  EXPECT_EQ(joint.at("min_wall_mm"), 1.0);
 }
 
 TEST(Report, WhatIsNoNumberIsNull) {

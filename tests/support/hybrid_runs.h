@@ -9,7 +9,8 @@ namespace fibrolite::testing {
 /// The default recipe with members thick enough for a voxel of 0.5 mm.
 inline Recipe sturdy() {
   Recipe recipe;
-  recipe.tcs.stick_mm = recipe.mfs.wall_mm = recipe.joint.column_mm = recipe.joint.min_wall_mm = 1.0;
+  recipe.tcs.stick_mm = recipe.mfs.wall_mm = 1.0;
+  recipe.joint.column_mm = recipe.joint.min_wall_mm = 1.0;
   recipe.mfs.fibre_mm = 3;
   return recipe;
 }

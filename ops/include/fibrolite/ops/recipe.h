@@ -27,6 +27,14 @@ namespace fibrolite {
 struct ShellParams {
   double thickness_mm = 1.0;  ///< 2 voxels or more.
 };
+/// Layers and columns as a recipe asks for them. Lengths left open ("auto") follow print.wall_mm: see joint_params().
+struct JointRecipe {
+  bool enabled = true;
+  bool columns = true;
+  Bridge bridge = Bridge::Mst;
+  std::optional<double> layer_mm, column_mm, spacing_mm, min_wall_mm;
+  double reach_mm = JointParams{}.reach_mm;
+};
 struct Recipe {
   ShellParams shell;
   PartitionParams partition;
@@ -34,7 +42,7 @@ struct Recipe {
   MfsParams mfs;  ///< Its seed follows `seed`.
   TcsParams tcs;
   GyroidParams gyroid;
-  JointParams joint;
+  JointRecipe joint;
   PrintParams print;
   Material material;
   std::uint64_t seed = 1;
@@ -62,6 +70,13 @@ struct RecipeKey {
 };
 /// Every key, in the order of to_json().
 [[nodiscard]] std::vector<RecipeKey> recipe_keys();
+
+/// What join() needs to know. Of the lengths left open, layer, columns and bridges are as thick as the defaults of
+/// JointParams, or as print.wall_mm where that is more; columns stand as far apart as the default, or as twice their
+/// diameter where that is more.
+[[nodiscard]] JointParams joint_params(const Recipe& recipe);
+/// The same run with every such length as a number: what a report records.
+[[nodiscard]] Recipe with_joint_lengths(Recipe recipe);
 
 /// What the numbers must be to each other (layers, columns and bridges of joints no thinner than print.wall_mm), and
 /// that everything `infill` makes is at least two voxels thick. A voxel of 0 checks the first alone. Only features that
