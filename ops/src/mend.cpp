@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "fibrolite/realize.h"
+#include "pillars_under.h"
 #include "print_limits.h"
 
 namespace fibrolite {
@@ -54,11 +55,11 @@ Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const
                              .cell_mm = 2.5 * params.tie.strut_mm,
                              .lattice = params.lattice};
   for (int round = 0; params.faults && round < rounds; ++round) {
-    const Scan found = print_scan(out.tied.solid, lumen, params.print, params.up, context);
+    Scan found = print_scan(out.tied.solid, lumen, params.print, params.up, context);
     std::vector<Capsule> balls;
     add_balls(found.walls, true, params, voxel, balls);
     add_balls(found.gaps, false, params, voxel, balls);
-    const std::vector<Pillar> under = pillars(out.tied.solid, lumen, bearing, context);
+    const std::vector<Pillar> under = pillars_under(std::move(found.steep), out.tied.solid, bearing, context);
     if (balls.empty() && under.empty()) break;
     const Shape thicker = unite({distance_to(out.tied.solid), intersect({b, unite({capsules(balls), shape(under)})})});
     out.tied = tie_again(out.tied, realize(thicker, body, context), body, params.tie, context);

@@ -10,6 +10,7 @@
 
 #include "fibrolite/error.h"
 #include "fibrolite/frame.h"
+#include "pillars_under.h"
 #include "print_limits.h"
 
 namespace fibrolite {
@@ -149,11 +150,15 @@ class Builder {
 
 std::vector<Pillar> pillars(const Solid& solid, const Shape& lumen, const PillarParams& params,
                             const Context& context) {
+  return pillars_under(overhangs(solid, lumen, params.print, params.up, context), solid, params, context);
+}
+
+std::vector<Pillar> pillars_under(std::vector<Spot> spots, const Solid& solid, const PillarParams& params,
+                                  const Context& context) {
   const double voxel = solid.grid().voxel_mm;
   if (!(params.shaft_mm >= 2 * voxel * (1 - 1e-9)))
     throw Error(Code::BadRecipe, "a shaft is at least two voxels thick", "shaft_mm");
   if (!(params.cell_mm > 0)) throw Error(Code::BadRecipe, "the cell must be above 0", "cell_mm");
-  std::vector<Spot> spots = overhangs(solid, lumen, params.print, params.up, context);
   std::vector<Vec3d> feet;
   for (const Spot& spot : spots) feet.push_back(spot.foot_mm);
   std::vector<float> beside(feet.size());
