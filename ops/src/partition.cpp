@@ -301,6 +301,14 @@ std::vector<Described> describe_all(const Anatomy& anatomy, const CutPieces& pie
   return described;
 }
 
+/// What a threshold means in this model: the largest diameter below it, mm.
+double diameter_at(const DiameterField& field, double threshold) {
+  double mm = 0;
+  for (std::size_t f = 0; f < field.normalized.size(); ++f)
+    if (field.normalized[f] < threshold) mm = std::max(mm, field.diameter_mm[f]);
+  return mm;
+}
+
 }  // namespace
 
 Partition partition(const Proxy& proxy, const DiameterField& field, const PartitionParams& params,
@@ -326,6 +334,10 @@ Partition partition(const Proxy& proxy, const DiameterField& field, const Partit
   } else if (params.threshold) {
     choice.limbs = find_limbs(anatomy, *params.threshold, params.min_area, params.min_slenderness);
     choice.threshold = *params.threshold;
+    if (choice.limbs.count == 0)
+      result.notes.push_back("the threshold " + number_text(choice.threshold) + ", a diameter of " +
+                             number_text(diameter_at(field, choice.threshold), 3) +
+                             " mm in this model, cuts off no limb; partition.threshold=auto looks for one that does");
   } else {
     choice = most_stable(anatomy, params, context);
     if (!choice.found) {

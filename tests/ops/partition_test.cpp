@@ -421,6 +421,24 @@ TEST(Partition, AMolarHasTwoRoots) {
   EXPECT_EQ(columns(p.partition).size(), 2U);
 }
 
+/// The paper's threshold is an eighth of the way from 8 to 40 mm, and roots are thinner than that at their ends alone.
+TEST(Partition, AThresholdThatCutsOffNoLimbIsNotedInMillimetres) {
+  const auto path = testing::asset("molar");
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "the bundled models have not been generated";
+  const auto notes = [&](double threshold) {
+    std::string all;
+    const Parted p = parted(read_mesh(path).mesh, {.threshold = threshold});
+    for (const std::string& note : p.partition.notes) all += note + "\n";
+    return all;
+  };
+  const std::string paper = notes(0.26);
+  const std::string start = "the threshold 0.26, a diameter of ";
+  ASSERT_NE(paper.find(start), std::string::npos) << paper;
+  EXPECT_NEAR(std::stod(paper.substr(paper.find(start) + start.size())), 11.9, 0.3);
+  EXPECT_NE(paper.find("partition.threshold=auto"), std::string::npos) << paper;
+  EXPECT_EQ(notes(0.5).find("cuts off no limb"), std::string::npos);
+}
+
 TEST(Partition, AHorseHasFourLegs) {
   const auto path = testing::shared_model("horse.ply");
   if (!path) GTEST_SKIP() << "the shared real meshes are not here";
