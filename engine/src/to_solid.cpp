@@ -58,11 +58,16 @@ bool has_inside(const openvdb::FloatTree& tree) {
               "close it, give it thickness, or use a smaller --voxel");
 }
 
-BandParams band_params(const ToSolidParams& params) {
+BandParams band_params(const Mesh& mesh, const ToSolidParams& params) {
+  // Nothing inside lies deeper than this: a band that reaches farther would only be looked for, with great cost, in a
+  // model that is small beside it.
+  const Vec3d size = bounds(mesh).size();
+  const double deepest_mm = 0.5 * std::min({size.x, size.y, size.z});
   BandParams band;
   band.voxel_mm = params.grid.voxel_mm;
   band.outside_vox = params.grid.band_vox;
-  band.inside_vox = static_cast<float>(params.inside_band_mm / params.grid.voxel_mm) + params.grid.band_vox;
+  band.inside_vox =
+      static_cast<float>(std::min(params.inside_band_mm, deepest_mm) / params.grid.voxel_mm) + params.grid.band_vox;
   return band;
 }
 
@@ -94,7 +99,7 @@ std::unique_ptr<Surface> outermost(const Surface& from, const BandParams& wanted
 class Conversion {
  public:
   Conversion(std::shared_ptr<const Mesh> mesh, const ToSolidParams& params, const Context& context)
-      : params_(band_params(params)), surface_(std::make_unique<Surface>(std::move(mesh))) {
+      : params_(band_params(*mesh, params)), surface_(std::make_unique<Surface>(std::move(mesh))) {
     if (!surface_->topology.closed()) {
       repairs_.emplace_back("open or irregular surface (" + std::to_string(surface_->topology.border.size()) +
                             " border edges): inside and outside were told by winding number");

@@ -28,10 +28,14 @@ namespace {
 /// Fitted to runs of the horse, the armadillo and the molar at 0.1 to 0.25 mm.
 struct Density {
   double faces_a_mm2 = 0, faces_a_mm3 = 0;
-  double body_a_mm2 = 0;            ///< Samples in leaves of the body.
+  double shell_mm = 0, voxel_mm = 0;
   double samples_a_face_mm2 = 0;    ///< In leaves of the solid: twelve voxels deep, with the band, for each of surface.
   double active_a_face_mm2 = 0;     ///< Band samples.
   double triangles_a_face_mm2 = 0;  ///< A surface crosses 1.5 edges of the lattice for each square of a voxel.
+  /// Samples in leaves of the body: as deep as the shell, where it is so deep.
+  [[nodiscard]] double body(double area_mm2, double volume_mm3) const {
+    return (std::min(shell_mm * area_mm2, volume_mm3) + 12 * voxel_mm * area_mm2) / (voxel_mm * voxel_mm * voxel_mm);
+  }
 };
 
 /// Surface per volume of lumen of balls and sticks: what shows of 16 sticks and 8 balls per cell.
@@ -72,7 +76,8 @@ Density density(double h, const Recipe& recipe, InfillKind infill) {
   } else {
     d.faces_a_mm2 = std::max(2 - d.faces_a_mm3 * recipe.shell.thickness_mm, 1.0);
   }
-  d.body_a_mm2 = (recipe.shell.thickness_mm + 12 * h) / (h * h * h);
+  d.shell_mm = recipe.shell.thickness_mm;
+  d.voxel_mm = h;
   d.samples_a_face_mm2 = 12 / (h * h);
   d.active_a_face_mm2 = 6 / (h * h);
   d.triangles_a_face_mm2 = 3 / (h * h);
@@ -150,7 +155,7 @@ Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, Inf
   const Density d = density(voxel_mm, recipe, infill);
   const double faces_mm2 = d.faces_a_mm2 * surface_mm2 + d.faces_a_mm3 * volume_mm3;
   const double solid = bytes_a_sample * d.samples_a_face_mm2 * faces_mm2;
-  const double body = bytes_a_sample * d.body_a_mm2 * surface_mm2;
+  const double body = bytes_a_sample * d.body(surface_mm2, volume_mm3);
   Prediction result;
   result.active_voxels = d.active_a_face_mm2 * faces_mm2;
   result.triangles = d.triangles_a_face_mm2 * faces_mm2;
@@ -209,9 +214,9 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
   double largest_layer = 0;  // triangles
   for (std::size_t i = 0; i < p.area_mm2.size(); ++i) {
     const double faces_mm2 = d.faces_a_mm2 * p.area_mm2[i] + d.faces_a_mm3 * p.volume_mm3[i];
-    sum.push_back(sum.back() +
-                  slab_times * safety * bytes_a_sample *
-                      (body_times * d.body_a_mm2 * p.area_mm2[i] + solid_times * d.samples_a_face_mm2 * faces_mm2));
+    sum.push_back(sum.back() + slab_times * safety * bytes_a_sample *
+                                   (body_times * d.body(p.area_mm2[i], p.volume_mm3[i]) +
+                                    solid_times * d.samples_a_face_mm2 * faces_mm2));
     largest_layer = std::max(largest_layer, d.triangles_a_face_mm2 * faces_mm2);
   }
   const auto bytes = [&](int from, int to) {

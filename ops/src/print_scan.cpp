@@ -17,29 +17,40 @@ namespace {
 /// Areas are summed in multiples of 1 / this: exact, in any order.
 constexpr double exact_mm2 = 1 << 28;
 
+/// Samples from `low` up to `high`, which is not among them.
+struct Samples {
+  Vec3i low{}, high{};
+};
+
 /// A dense box of samples, in voxels: values, their gradient and where a ray leaves what it is in.
 class Window {
  public:
-  Window(const Solid& solid, Vec3i low, int edge)
-      : low_(low), edge_(static_cast<std::size_t>(edge)), values_(edge_ * edge_ * edge_) {
-    copy_samples(solid, low, {edge, edge, edge}, values_.data());
+  /// `origin`: what places are reckoned from, so that rounding does not depend on where the box ends.
+  Window(const Solid& solid, Vec3i origin, const Samples& box)
+      : origin_(origin),
+        box_(box),
+        size_{box.high.x - box.low.x, box.high.y - box.low.y, box.high.z - box.low.z},
+        row_(static_cast<std::size_t>(size_.z)),
+        plane_(static_cast<std::size_t>(size_.y) * row_),
+        values_(static_cast<std::size_t>(size_.x) * plane_) {
+    copy_samples(solid, box.low, size_, values_.data());
     const auto inverse = static_cast<float>(1 / solid.grid().voxel_mm);
     for (float& v : values_) v *= inverse;
   }
   [[nodiscard]] const float* row(Vec3i at) const {
-    return values_.data() + index(at.x - low_.x, at.y - low_.y, at.z - low_.z);
+    return values_.data() + index(at.x - box_.low.x, at.y - box_.low.y, at.z - box_.low.z);
   }
-  [[nodiscard]] std::array<std::size_t, 3> stride() const { return {edge_ * edge_, edge_, 1}; }
+  [[nodiscard]] std::array<std::size_t, 3> stride() const { return {plane_, row_, 1}; }
 
   /// Linear between samples; `p` in voxels from the world's origin, at least a voxel inside the window.
   [[nodiscard]] double value(Vec3d p) const {
-    const double x = p.x - low_.x, y = p.y - low_.y, z = p.z - low_.z;
+    const double x = p.x - origin_.x, y = p.y - origin_.y, z = p.z - origin_.z;
     const auto i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
     const double u = x - i, v = y - j, w = z - k;
-    const float* a = values_.data() + index(i, j, k);
-    const float* b = a + edge_ * edge_;
+    const float* a = row({origin_.x + i, origin_.y + j, origin_.z + k});
+    const float* b = a + plane_;
     const auto face = [&](const float* f) {
-      const double near = f[0] + w * (f[1] - f[0]), far = f[edge_] + w * (f[edge_ + 1] - f[edge_]);
+      const double near = f[0] + w * (f[1] - f[0]), far = f[row_] + w * (f[row_ + 1] - f[row_]);
       return near + v * (far - near);
     };
     const double low = face(a);
@@ -61,12 +72,14 @@ class Window {
     return normalized(Vec3d{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})});
   }
   /// How far from a surface point the sign changes again along a unit direction, voxels; infinity: not within `most`.
-  /// `inside`: it runs through material.
+  /// `inside`: it runs through material. Beyond the window there is none.
   [[nodiscard]] double chord(Vec3d from, Vec3d along, bool inside, double most) const {
     constexpr double step = 0.4;
     double before = 0;
     for (double t = step; t < most + step; t += step) {
-      const double here = inside ? value(from + t * along) : -value(from + t * along);
+      const Vec3d p = from + t * along;
+      if (!holds(p)) return INFINITY;
+      const double here = inside ? value(p) : -value(p);
       if (here >= 0) return t - step * (before < 0 ? here / (here - before) : 0.5);
       before = here;
     }
@@ -75,23 +88,61 @@ class Window {
 
  private:
   [[nodiscard]] std::size_t index(int i, int j, int k) const {
-    return (static_cast<std::size_t>(i) * edge_ + static_cast<std::size_t>(j)) * edge_ + static_cast<std::size_t>(k);
+    return static_cast<std::size_t>(i) * plane_ + static_cast<std::size_t>(j) * row_ + static_cast<std::size_t>(k);
+  }
+  /// All samples that value() takes for `p` are in the window.
+  [[nodiscard]] bool holds(Vec3d p) const {
+    const auto within = [](double v, int low, int high) { return v >= low && v < high - 1; };
+    return within(p.x, box_.low.x, box_.high.x) && within(p.y, box_.low.y, box_.high.y) &&
+           within(p.z, box_.low.z, box_.high.z);
   }
 
-  Vec3i low_;
-  std::size_t edge_;
+  Vec3i origin_;
+  Samples box_;
+  Vec3i size_;
+  std::size_t row_, plane_;
   std::vector<float> values_;
 };
 
 struct Tiles {
   std::vector<Vec3i> origins;
-  int edge, margin;
+  int edge = 32, margin = 0;
+  Samples all;  ///< The solid, and a few voxels of void around.
+
+  /// What the rays of a tile may need: of walls far thicker than the solid is large no more than the solid.
+  [[nodiscard]] Samples around(Vec3i origin) const {
+    const auto low = [&](int at, int least) { return std::max(at - margin, least); };
+    const auto high = [&](int at, int most) { return std::min(at + edge + margin, most); };
+    return {{low(origin.x, all.low.x), low(origin.y, all.low.y), low(origin.z, all.low.z)},
+            {high(origin.x, all.high.x), high(origin.y, all.high.y), high(origin.z, all.high.z)}};
+  }
+  /// A tile's own samples.
+  [[nodiscard]] Samples of(Vec3i origin) const {
+    const Samples box = around(origin);
+    constexpr int beside = 1;  // samples beside a crossing are looked at
+    const auto low = [](int at, int least) { return std::max(at, least + beside); };
+    const auto high = [&](int at, int most) { return std::min(at + edge, most - 2 * beside); };
+    return {{low(origin.x, box.low.x), low(origin.y, box.low.y), low(origin.z, box.low.z)},
+            {high(origin.x, box.high.x), high(origin.y, box.high.y), high(origin.z, box.high.z)}};
+  }
 };
 /// Cubes that hold all blocks of the solid. The margin, as wide as a ray is long, is at most as much again.
 Tiles tiles_of(const Solid& solid, double reach_vox) {
-  const int margin = static_cast<int>(std::ceil(reach_vox)) + 4;
-  const int edge = std::max(32, (2 * margin + 7) / 8 * 8);
-  Tiles tiles{blocks(solid), edge, margin};
+  Tiles tiles{.origins = blocks(solid), .all = {}};
+  constexpr int around = 5, block = 8;  // as margins of tiles at least, and one more for the next block's samples
+  if (!tiles.origins.empty()) tiles.all = {tiles.origins.front(), tiles.origins.front()};
+  for (const Vec3i o : tiles.origins) {
+    Samples& all = tiles.all;
+    all.low = {std::min(all.low.x, o.x), std::min(all.low.y, o.y), std::min(all.low.z, o.z)};
+    all.high = {std::max(all.high.x, o.x), std::max(all.high.y, o.y), std::max(all.high.z, o.z)};
+  }
+  tiles.all.low = {tiles.all.low.x - around, tiles.all.low.y - around, tiles.all.low.z - around};
+  const int beyond = block + around;
+  tiles.all.high = {tiles.all.high.x + beyond, tiles.all.high.y + beyond, tiles.all.high.z + beyond};
+  constexpr double longest = 1 << 24;  // more than any solid
+  tiles.margin = static_cast<int>(std::min(std::ceil(reach_vox), longest)) + 4;
+  tiles.edge = std::max(32, (2 * tiles.margin + 7) / 8 * 8);
+  const int edge = tiles.edge;
   const auto down = [&](int v) { return static_cast<int>(std::floor(static_cast<double>(v) / edge)) * edge; };
   for (Vec3i& o : tiles.origins) o = {down(o.x), down(o.y), down(o.z)};
   const auto order = [](Vec3i a, Vec3i b) { return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z); };
@@ -101,15 +152,14 @@ Tiles tiles_of(const Solid& solid, double reach_vox) {
 }
 
 /// All crossings of the lattice's edges with the surface in one tile.
-void find_crossings(const Window& window, Vec3i origin, int edge, double voxel_mm, const SampleRange* range,
+void find_crossings(const Window& window, const Samples& own, double voxel_mm, const SampleRange* range,
                     std::vector<Spot>& out) {
   const std::array<std::size_t, 3> stride = window.stride();
-  for (int x = origin.x; x < origin.x + edge; ++x) {
-    for (int y = origin.y; y < origin.y + edge; ++y) {
-      const float* row = window.row({x, y, origin.z});
-      for (int z = 0; z < edge; ++z) {
-        if (range != nullptr && !range->holds({x, y, origin.z + z})) continue;
-        const float* a = row + z;
+  for (int x = own.low.x; x < own.high.x; ++x) {
+    for (int y = own.low.y; y < own.high.y; ++y) {
+      const float* a = window.row({x, y, own.low.z});
+      for (int z = own.low.z; z < own.high.z; ++z, ++a) {
+        if (range != nullptr && !range->holds({x, y, z})) continue;
         for (int axis = 0; axis < 3; ++axis) {
           const auto k = static_cast<std::size_t>(axis);
           const float* b = a + stride[k];
@@ -122,7 +172,7 @@ void find_crossings(const Window& window, Vec3i origin, int edge, double voxel_m
             g[m] = m == k ? *b - *a : 0.5 * ((1 - t) * (a[s] - *(a - s)) + t * (b[s] - *(b - s)));
           }
           const Vec3d normal = normalized({g[0], g[1], g[2]});
-          const Vec3i sample{x, y, origin.z + z};
+          const Vec3i sample{x, y, z};
           Vec3i other = sample;
           (axis == 0 ? other.x : axis == 1 ? other.y : other.z) += 1;
           Vec3d foot{1.0 * sample.x, 1.0 * sample.y, 1.0 * sample.z};
@@ -139,10 +189,10 @@ void find_crossings(const Window& window, Vec3i origin, int edge, double voxel_m
 Scan scan_tile(const Solid& solid, const Shape& lumen, const ScanLimits& limits, Vec3i origin, const Tiles& tiles,
                const SampleRange* range) {
   const double h = solid.grid().voxel_mm;
-  const Window window(solid, {origin.x - tiles.margin, origin.y - tiles.margin, origin.z - tiles.margin},
-                      tiles.edge + 2 * tiles.margin);
+  const int margin = tiles.margin;
+  const Window window(solid, {origin.x - margin, origin.y - margin, origin.z - margin}, tiles.around(origin));
   std::vector<Spot> spots;
-  find_crossings(window, origin, tiles.edge, h, range, spots);
+  find_crossings(window, tiles.of(origin), h, range, spots);
   std::vector<Vec3d> feet;
   for (const Spot& spot : spots) feet.push_back(spot.foot_mm);
   std::vector<float> depth(spots.size());

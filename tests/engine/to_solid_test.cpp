@@ -182,6 +182,19 @@ TEST(ToSolid, the_inside_band_reaches_its_depth_and_the_rest_reads_minus_that) {
   EXPECT_EQ(solid.grid(), (Grid{0.5, 2.5F}));
 }
 
+/// Searching each triangle's surroundings 10000 voxels deep would take more memory than there is.
+TEST(ToSolid, a_band_deeper_than_the_model_is_no_more_than_the_model) {
+  const Mesh mesh = testing::icosphere(10, 5, {0.3, 0.2, 0.1});
+  const Solid deep = solid_of(mesh, 0.1, 1000), whole = solid_of(mesh, 0.1, 11);
+  EXPECT_NEAR(deep.distance({0.3, 0.2, 0.1}), -10, 0.1);
+  EXPECT_EQ(deep.active_voxels(), whole.active_voxels());
+  const auto accessor = to_vdb(whole)->getConstAccessor();
+  const auto grid = to_vdb(deep);
+  std::int64_t different = 0;
+  for (auto value = grid->cbeginValueOn(); value; ++value) different += *value != accessor.getValue(value.getCoord());
+  EXPECT_EQ(different, 0);
+}
+
 TEST(ToSolid, a_turned_model_gives_the_turned_solid) {
   const Mesh mesh = testing::torus_mesh(9, 3, 40, 20);
   const Solid upright = solid_of(mesh, 0.4, 1);

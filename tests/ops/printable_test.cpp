@@ -207,6 +207,17 @@ TEST(Printable, the_same_in_ranges) {
   }
 }
 
+/// A limit far beyond the solid: what a tile looks at ends with the solid, not with the limit. 2000 voxels around a
+/// tile would be terabytes.
+TEST(Printable, OfASmallSolidAllIsThin) {
+  const Solid ball = realize(sphere({0.3, 0.1, -0.2}, 1), Box3d{{-2, -2, -2}, {2, 2, 2}}, {.voxel_mm = 0.1});
+  const PrintParams wide{.wall_mm = 200, .gap_mm = 200};
+  const PrintFault thin = printable(ball, everything(), wide, z, 1.6).thin_walls;
+  ASSERT_EQ(thin.places, 1);
+  EXPECT_NEAR(thin.least_mm, 2, 0.05);
+  EXPECT_NEAR(thin.area_mm2, 4 * pi, 0.02 * 4 * pi);
+}
+
 TEST(Printable, RefusesWhatIsNoLimit) {
   const Solid solid = make(sphere({}, 2));
   for (const PrintParams& bad : {PrintParams{.wall_mm = 0}, PrintParams{.gap_mm = -1}, PrintParams{.overhang_deg = 91}})

@@ -19,7 +19,8 @@ struct ToSolidParams {
   double inside_band_mm = 0;
 };
 struct ToSolidResult {
-  Solid solid;                       ///< Interior background is -(max(inside_band_mm, 0) + band); exterior +band.
+  /// Interior background is -(inside_band_mm + band), or less if the body is nowhere so deep; exterior +band.
+  Solid solid;
   std::vector<std::string> repairs;  ///< What had to be decided by winding number, in words; empty for a clean mesh.
 };
 /// @throws Error BadInput: the mesh encloses no volume (an open sheet, all triangles in one plane, thinner than the
