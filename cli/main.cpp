@@ -10,6 +10,7 @@
 #include "exit_codes.h"
 #include "fibrolite/ops/report.h"
 #include "fibrolite/ops/text.h"
+#include "outputs.h"
 #include "terminal.h"
 
 namespace fibrolite::cli {
@@ -73,7 +74,7 @@ int run(int argc, char** argv) {
 }
 
 int fail(const std::string& message, ExitCode code) {
-  print_error(message);
+  print_error(with_asked_names(message));
   return code;
 }
 

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <string>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "exit_codes.h"
 #include "fibrolite/error.h"
@@ -19,6 +21,12 @@ namespace fs = std::filesystem;
 // What a signal handler may read: names that do not change while they are listed here.
 std::atomic<const std::vector<std::string>*> hidden_names{nullptr};
 std::atomic<bool> in_commit{false};
+
+/// Hidden name and the one that was asked for, of all outputs ever planned.
+std::vector<std::pair<std::string, std::string>>& places() {
+  static std::vector<std::pair<std::string, std::string>> all;
+  return all;
+}
 
 /// The file itself where `target` is a link to one, so that the link stays.
 fs::path followed(const fs::path& target) {
@@ -49,10 +57,12 @@ Outputs::Outputs(const std::vector<fs::path>& targets, const fs::path& model, bo
       if (fs::weakly_canonical(other.target, error) == fs::weakly_canonical(target, error))
         throw UsageError("two outputs have the same name", asked.string(), "choose another name for one");
     if (exists && !overwrite)
-      throw Error(Code::Io, "the output exists", asked.string(), "use --overwrite to replace it");
+      throw Error(Code::Io, "the output exists", asked.string(),
+                  "use --overwrite to replace it, or choose another name");
     static_cast<void>(OutputFile(target));  // throws if the folder is missing or nothing can be written there
     items_.push_back({asked, target, hidden_name(target), exists});
     names->push_back(fs::absolute(items_.back().hidden, error).string());
+    places().emplace_back(items_.back().hidden.string(), asked.string());
   }
   hidden_names = names.release();
 }
@@ -96,5 +106,13 @@ void Outputs::discard() noexcept {
 }
 
 bool Outputs::committing() noexcept { return in_commit; }
+
+std::string with_asked_names(std::string text) {
+  for (const auto& [hidden, asked] : places()) {
+    const auto at = text.find(hidden);
+    if (at != std::string::npos) text.replace(at, hidden.size(), asked);
+  }
+  return text;
+}
 
 }  // namespace fibrolite::cli

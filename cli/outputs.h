@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace fibrolite::cli {
@@ -36,5 +37,8 @@ class Outputs {
   };
   std::vector<Item> items_;
 };
+
+/// A message with the outputs' own names in place of the hidden ones that they are written under.
+[[nodiscard]] std::string with_asked_names(std::string text);
 
 }  // namespace fibrolite::cli

@@ -60,9 +60,12 @@ namespace {
   while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting *= 2;
   fitting = std::max(voxel_mm, fitting / 2);
   while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting = round_up(fitting * 1.05);
+  const std::string unit = is_odd_size(coarsest) ? "is the model's unit right? It is " + number_text(coarsest, 6) +
+                                                       " mm long: try --unit or --size, or "
+                                                 : "";
   throw Error(Code::TooLarge, what, "voxel " + number_text(voxel_mm) + " mm",
-              fitting < coarsest ? "use --voxel " + number_text(fitting) + " or larger, or raise --max-memory"
-                                 : "raise --max-memory");
+              unit + (fitting < coarsest ? "use --voxel " + number_text(fitting) + " or larger, or raise --max-memory"
+                                         : "raise --max-memory"));
 }
 
 }  // namespace
@@ -111,6 +114,8 @@ void write_text(const std::filesystem::path& path, const std::string& text) {
 }
 
 std::string memory_text(double bytes) {
+  constexpr double most = 1e6 * 1024.0 * 1024 * 1024 * 1024;
+  if (!(bytes < most)) return "a million TB or more";
   const char* unit = "bytes";
   for (const char* larger : {"KB", "MB", "GB", "TB"}) {
     if (bytes < 1000) break;

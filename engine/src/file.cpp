@@ -76,7 +76,7 @@ int write_all(int fd, const std::byte* data, std::size_t size) {
 
 [[noreturn]] void fail_to_write(int error, const fs::path& target) {
   throw Error(Code::Io, "cannot write the output: " + system_reason(error), target.string(),
-              error == ENOSPC || error == EDQUOT ? "free some space" : "");
+              error == ENOSPC || error == EDQUOT ? "free some space" : "choose another folder");
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ struct OutputFile::State {
     std::error_code error;
     if (!fs::is_directory(folder, error))
       throw Error(Code::Io, "the output folder does not exist", folder.string(), "make it first");
-    if (!target.has_filename()) throw Error(Code::Io, "the output has no file name", target.string());
+    if (!target.has_filename()) throw Error(Code::Io, "the output has no file name", target.string(), "give it one");
     const fs::file_status status = fs::status(target, error);
     if (fs::exists(status) && !fs::is_regular_file(status))
       throw Error(Code::Io, "the output exists and is not a regular file", target.string(), "choose another name");
@@ -104,7 +104,9 @@ struct OutputFile::State {
       hidden = folder / name;
       fd = ::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     } while (fd < 0 && errno == EEXIST);
-    if (fd < 0) throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string());
+    if (fd < 0)
+      throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string(),
+                  "choose another, or see to its permissions");
     slot = register_name(fs::absolute(hidden, error).string());
     buffer.reserve(buffer_bytes);
   }
@@ -184,7 +186,9 @@ ScratchFile::ScratchFile(const fs::path& folder) : folder_(folder) {
   // Not every file system has files without a name from the start.
   std::string name = (place / ".fibrolite-XXXXXX").string();
   fd_ = ::mkostemp(name.data(), O_CLOEXEC);
-  if (fd_ < 0) throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string());
+  if (fd_ < 0)
+    throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string(),
+                "choose another, or see to its permissions");
   ::unlink(name.c_str());
 }
 

@@ -28,6 +28,11 @@ const Format& format_of(const std::filesystem::path& path) {
   if (format != formats.end()) return *format;
   std::string known;
   for (const Format& f : formats) known += std::string(known.empty() ? "" : " ") + f.ending;
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw Error(Code::BadInput, "this is a folder, not a model", path.string(), "give a file in it: " + known);
+  if (ending.empty())
+    throw Error(Code::Unsupported, "the name has no ending that says the format", path.string(), "known are " + known);
   throw Error(Code::Unsupported, "not a mesh format known here: '" + ending + "'", path.string(), "known are " + known);
 }
 
@@ -66,7 +71,7 @@ MeshFile read_mesh(const std::filesystem::path& path, const Context& context) {
   const FileBytes bytes = read_file(path, context);
   const Source source{bytes.view(), path.string()};
   MeshFile file = format.read(source, context);
-  if (file.mesh.triangles.empty()) fail(source, "the model has no triangles", "");
+  if (file.mesh.triangles.empty()) fail(source, "the model has no triangles", "", "save it with its faces");
   context.progress(1);
   return file;
 }

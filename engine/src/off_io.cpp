@@ -21,7 +21,8 @@ void read_keyword(const Source& source, TextCursor& cursor) {
   for (const std::string_view letters : {"ST", "C", "N"})
     if (rest.starts_with(letters)) rest.remove_prefix(letters.size());
   if (rest == "4OFF" || rest == "nOFF" || rest == "4nOFF")
-    throw Error(Code::Unsupported, "OFF files with other than 3 coordinates are not read", source.name);
+    throw Error(Code::Unsupported, "OFF files with other than 3 coordinates are not read", source.name,
+                "save it with x, y, z");
   if (rest != "OFF") fail_at(source, at, "expected 'OFF', found " + shown(keyword), "is it an OFF file?");
   if (cursor.skip_blanks() && source.bytes.substr(cursor.position()).starts_with("BINARY"))
     throw Error(Code::Unsupported, "binary OFF files are not read", source.name, "save it as text");

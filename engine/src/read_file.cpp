@@ -31,7 +31,8 @@ struct Descriptor {
 
 FileBytes read_file(const std::filesystem::path& path, const Context& context) {
   const auto unreadable = [&](int error) {
-    return Error(Code::BadInput, "cannot read the file: " + std::system_category().message(error), path.string());
+    return Error(Code::BadInput, "cannot read the file: " + std::system_category().message(error), path.string(),
+                 error == EISDIR ? "give a file in it" : "check its name and permissions");
   };
   const Descriptor file(path.c_str());
   if (file.fd < 0) throw unreadable(errno);
@@ -57,7 +58,7 @@ FileBytes read_file(const std::filesystem::path& path, const Context& context) {
     if (got == 0) break;
     size += static_cast<std::size_t>(got);
   }
-  if (size == 0) throw Error(Code::BadInput, "the file is empty", path.string());
+  if (size == 0) throw Error(Code::BadInput, "the file is empty", path.string(), "save it again");
   return {std::move(bytes), size};
 }
 

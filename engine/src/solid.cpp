@@ -306,7 +306,8 @@ Solid from_vdb(const openvdb::FloatGrid::ConstPtr& grid) {
                 "resample it first");
   }
   if (!(grid->background() > 0)) {
-    throw Error(Code::BadInput, "the grid is no level set: its background is not positive", grid->getName());
+    throw Error(Code::BadInput, "the grid is no level set: its background is not positive", grid->getName(),
+                "give a level set, negative inside");
   }
   return make_solid(grid, {voxel.x(), static_cast<float>(grid->background() / voxel.x())});
 }

@@ -234,7 +234,9 @@ Error damaged(const std::filesystem::path& path, const std::string& what) {
 
 void check_bytes(const std::filesystem::path& path, std::string_view bytes) {
   constexpr std::string_view magic{"\x20\x42\x44\x56\0\0\0\0", 8};
-  if (!bytes.starts_with(magic)) throw Error(Code::BadInput, "not a .vdb file", path.string());
+  if (!bytes.starts_with(magic))
+    throw Error(Code::BadInput, "not a .vdb file", path.string(),
+                "give a level set, as generate -o FILE.vdb writes it");
   if (bytes.size() < uuid_end) throw damaged(path, "the .vdb file ends in its header");
   const std::string_view uuid = bytes.substr(uuid_begin, uuid_size);
   if (!uuid.starts_with(our_uuid)) return;

@@ -36,7 +36,8 @@ bool underflows(std::string_view word) {
 }  // namespace
 
 void fail(const Source& source, const std::string& what, const std::string& place, const std::string& hint) {
-  throw Error(Code::BadInput, what, source.name + (place.empty() ? "" : ", " + place), hint);
+  throw Error(Code::BadInput, what, source.name + (place.empty() ? "" : ", " + place),
+              hint.empty() ? "the file is damaged, or not what its ending says: save it again" : hint);
 }
 
 void fail_at(const Source& source, std::size_t position, const std::string& what, const std::string& hint) {

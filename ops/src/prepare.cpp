@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "fibrolite/disjoint_sets.h"
@@ -157,14 +158,34 @@ bool is_flat(const Mesh& mesh) {
 }
 
 void warn_about_units(Model& model) {
-  constexpr double smallest_mm = 5, largest_mm = 2000;
   const double side = bounds(model.mesh).longest_side();
-  if (side < smallest_mm || side > largest_mm)
+  if (is_odd_size(side))
     model.warnings.push_back("the model's longest side is " + number_text(side, 4) +
                              " mm: is its unit right? Try --unit or --size");
 }
 
+/// Coordinates are floats: far from the origin their steps are wider than what the model is made of.
+void check_place(const Mesh& mesh) {
+  if (mesh.triangles.empty()) return;
+  const Box3d box = used_box(mesh);
+  double farthest = 0;
+  for (const Vec3d p : {box.min, box.max}) farthest = std::max({farthest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  const auto at = static_cast<float>(farthest);
+  const double step = std::nextafter(at, std::numeric_limits<float>::infinity()) - at;
+  constexpr double steps = 4000;  // along the model: ten to the coarsest voxel chosen by itself
+  if (box.longest_side() >= steps * step || !(box.longest_side() > 0)) return;
+  throw Error(Code::BadInput,
+              "the model is " + number_text(box.longest_side(), 3) + " mm long and lies " + number_text(farthest, 3) +
+                  " mm from the origin, where coordinates are " + number_text(step, 2) + " mm apart",
+              "", "move it to the origin");
+}
+
 }  // namespace
+
+bool is_odd_size(double longest_mm) {
+  constexpr double smallest_mm = 5, largest_mm = 2000;
+  return longest_mm < smallest_mm || longest_mm > largest_mm;
+}
 
 Vec3d direction(Up up) {
   switch (up) {
@@ -200,7 +221,9 @@ Model prepare(const MeshFile& file, const PrepareParams& params, const Context& 
   if (params.size_mm && longest > 0) factor = *params.size_mm / longest;
   scale(mesh, factor);
   if (const double side = used_box(mesh).longest_side(); !std::isfinite(side))
-    throw Error(Code::BadInput, "the model is too large to be held in mm", number_text(longest * factor, 4) + " mm");
+    throw Error(Code::BadInput, "the model is too large to be held in mm", number_text(longest * factor, 4) + " mm",
+                "give another --size or --unit");
+  check_place(mesh);
   if (!file.mesh.triangle_colors.empty()) {
     model.painted = mesh;
     model.painted.triangle_colors = file.mesh.triangle_colors;
@@ -224,8 +247,10 @@ Model prepare(const MeshFile& file, const PrepareParams& params, const Context& 
   context.check();
 
   if (mesh.triangles.empty())
-    throw Error(Code::BadInput, "no triangles are left: all " + std::to_string(file.mesh.triangles.size()) +
-                                    " have no area or cancel each other");
+    throw Error(Code::BadInput,
+                "no triangles are left: all " + std::to_string(file.mesh.triangles.size()) +
+                    " have no area or cancel each other",
+                "", "the model must enclose a volume");
   if (is_flat(mesh))
     throw Error(Code::BadInput, "all triangles lie in one plane", "", "the model must enclose a volume");
 

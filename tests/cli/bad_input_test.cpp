@@ -72,7 +72,24 @@ const std::vector<std::array<float, 9>> tetrahedron{
     {0, 0, 0, 0, 9, 0, 9, 0, 0}, {0, 0, 0, 9, 0, 0, 0, 0, 9}, {0, 0, 0, 0, 0, 9, 0, 9, 0}, {9, 0, 0, 0, 9, 0, 0, 0, 9}};
 
 TEST_F(BadInput, MissingModel) { EXPECT_THAT(refused_model(models / "nowhere.stl"), HasSubstr("nowhere.stl")); }
-TEST_F(BadInput, AFolderAsModel) { refused_model(models.path()); }
+TEST_F(BadInput, AFolderAsModel) { EXPECT_THAT(refused_model(models.path()), HasSubstr("a folder, not a model")); }
+TEST_F(BadInput, NoEnding) { EXPECT_THAT(refused_model(model("cube", "solid")), HasSubstr("no ending")); }
+TEST_F(BadInput, AModelFarFromTheOrigin) {
+  Mesh mesh = cube(20);
+  for (Vec3f& v : mesh.vertices) v.x += 1e8F;
+  const fs::path path = models / "far.stl";
+  write_mesh(path, mesh);
+  EXPECT_THAT(refused_model(path), HasSubstr("move it to the origin"));
+}
+/// A unit forgotten is what a newcomer does first: by the size it is asked for, whatever else is in the way.
+TEST_F(BadInput, ModelsWhoseUnitIsWrong) {
+  const fs::path path = models / "metres.stl";
+  write_mesh(path, cube(20000));
+  EXPECT_THAT(refused({"generate", path, "-o", outputs / "out.stl", "--max-memory", "500M"}, OutOfMemory),
+              AllOf(HasSubstr("20000 mm"), HasSubstr("try --unit or --size")));
+  EXPECT_THAT(refused({"generate", path, "-o", outputs / "out.stl", "--size", "1e25"}, OutOfMemory),
+              AllOf(HasSubstr("a million TB or more"), HasSubstr("try --unit or --size")));
+}
 TEST_F(BadInput, EmptyFiles) {
   for (const char* name : {"a.stl", "a.obj", "a.ply", "a.off", "a.3mf", "a.vdb"}) refused_model(model(name, ""));
 }
@@ -253,6 +270,15 @@ TEST_F(BadInput, OutputsAreCheckedBeforeTheModelIsRead) {
   EXPECT_THAT(refused({"generate", models / "nowhere.stl", "-o", outputs / "nowhere" / "out.stl"}, NoOutput),
               HasSubstr("folder"));
 }
+/// The file is written under a hidden name: the user never gave that.
+TEST_F(BadInput, AnOutputThatCannotGrowIsNamedAsItWasAskedFor) {
+  const Finished run =
+      run_program("/bin/sh", {"-c", "trap '' XFSZ; ulimit -f 16; exec \"$0\" \"$@\"", FIBROLITE_PROGRAM, "generate",
+                              good_model(), "-o", outputs / "out.stl", "--voxel", "0.4", "--infill", "tcs"});
+  expect_refused(run, NoOutput);
+  EXPECT_THAT(run.err, HasSubstr("(" + (outputs / "out.stl").string() + ")"));
+  EXPECT_THAT(names_in(outputs.path()), IsEmpty());
+}
 TEST_F(BadInput, AStandardOutputThatIsFull) {
   struct stat full {};
   if (stat("/dev/full", &full) != 0 || !S_ISCHR(full.st_mode)) GTEST_SKIP() << "no device /dev/full here";
@@ -262,6 +288,19 @@ TEST_F(BadInput, AStandardOutputThatIsFull) {
 }
 
 // ---- what is not bad
+
+/// A model smaller than the shell is thick, and than the walls that are looked for: solid, with a word on its unit.
+TEST_F(BadInput, AModelOfATwentiethOfAMillimetre) {
+  const fs::path path = models / "tiny.ply";
+  write_mesh(path, icosphere(0.025, 5));
+  const Finished run = run_program(FIBROLITE_PROGRAM, {"generate", path, "-o", outputs / "out.stl", "--infill", "tcs",
+                                                       "--voxel", "0.0005", "--max-memory", "1G"});
+  ASSERT_EQ(run.code, Done) << run.err;
+  const auto report = report_in(outputs / "out.report.json");
+  EXPECT_NEAR(report["solid"]["fill_ratio"].get<double>(), 1, 0.001);
+  EXPECT_THAT(report["warnings"].dump(), HasSubstr("is its unit right?"));
+  EXPECT_EQ(report["print"]["thin_walls"]["places"], 1);
+}
 
 TEST_F(BadInput, HelpAndRecipeAreNoErrors) {
   for (const std::vector<std::string>& arguments :

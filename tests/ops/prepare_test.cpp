@@ -64,6 +64,19 @@ TEST(Prepare, warns_about_units) {
   EXPECT_THAT(prepared(cube(1999)).warnings, IsEmpty());
 }
 
+/// Floats of 24 bits: 100 m from the origin their steps are 2^-7 mm, a 2560th of 20 mm; 60 m from it half of that.
+TEST(Prepare, refuses_models_too_far_from_the_origin_for_their_coordinates) {
+  const auto at = [](float mm) {
+    Mesh mesh = cube(20);
+    for (Vec3f& v : mesh.vertices) v.y += mm;
+    return mesh;
+  };
+  EXPECT_EQ(refusal(at(1e5F)), Code::BadInput);
+  EXPECT_EQ(refusal(at(-1e8F)), Code::BadInput);
+  EXPECT_NO_THROW((void)prepared(at(6e4F)));
+  EXPECT_NO_THROW((void)prepared(at(-6e4F), {.unit_mm = 1000}));  // in metres it is the same model
+}
+
 TEST(Prepare, inside_out_models_are_turned_and_both_sides_give_the_same) {
   const Mesh mesh = torus_mesh(30, 10, 40, 20);
   const Model model = prepared(flipped(mesh));

@@ -23,11 +23,12 @@ inline Finished run(const std::vector<std::string>& arguments) {
 
 inline nlohmann::json report_in(const std::filesystem::path& file) { return nlohmann::json::parse(content(file)); }
 
-/// Nothing but one line of error.
+/// Nothing but one line of error: WHAT (WHERE); TRY.
 inline void expect_refused(const Finished& run, int code) {
   EXPECT_EQ(run.code, code) << run.err;
   EXPECT_THAT(run.err, ::testing::StartsWith("fibrolite: error: "));
   EXPECT_EQ(std::count(run.err.begin(), run.err.end(), '\n'), 1) << run.err;
+  EXPECT_THAT(run.err, ::testing::HasSubstr("; ")) << "it does not say what to try";
   EXPECT_EQ(run.out, "");
 }
 /// Runs and expects: this exit code, one line of error, nothing written. Returns the line.
