@@ -134,7 +134,7 @@ struct BentLimb {
   static Vec3d on_line(double a) { return {ring * std::cos(a), ring * std::sin(a), 0}; }
   [[nodiscard]] static PlaneGrid grid_at(int section) {
     const double a = 0.06 + (std::numbers::pi / 2 - 0.12) * section / (sections - 1);
-    return PlaneGrid::about(frame_along(on_line(a), {-std::sin(a), std::cos(a), 0}), thick, pixel, 2);
+    return PlaneGrid::about({frame_along(on_line(a), {-std::sin(a), std::cos(a), 0})}, thick, pixel, 2);
   }
   [[nodiscard]] int ends_at(const Shape& membranes, int section) const {
     const PlaneGrid grid = grid_at(section);
