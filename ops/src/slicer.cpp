@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fibrolite/slicer.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -38,6 +40,14 @@ struct Slicer::Filled {
 
   double cut(int layer, const PixelRange& tile, std::uint8_t* rows, std::ptrdiff_t stride, const Context& context) {
     if (!stream) return slice_into(rows, stride, tile, shape, grid, layer, slice, context);
+    // A thread that waits for tasks of ours takes up others meanwhile. If the host asks for layers in such tasks, one
+    // of them would then wait for `use`, which its own thread holds.
+    return tbb::this_task_arena::isolate([&] { return cut_slab(layer, tile, rows, stride, context); });
+  }
+
+ private:
+  double cut_slab(int layer, const PixelRange& tile, std::uint8_t* rows, std::ptrdiff_t stride,
+                  const Context& context) {
     const std::size_t wanted = stream->slab_at(grid.middle(layer)[stream->plan().axis]);
     for (;;) {
       {
@@ -351,7 +361,7 @@ int fibrolite_job_tile(const fibrolite_job* job, int layer, int x0, int y0, int 
         x0 >= 0 && y0 >= 0 && width > 0 && height > 0 && width <= grid.width - x0 && height <= grid.height - y0,
         "the tile is empty, or reaches beyond the layer");
     fibrolite::need(stride >= static_cast<std::size_t>(width) && stride <= PTRDIFF_MAX,
-                    "the stride is below the width");
+                    "the stride is below the width, or beyond all memory");
     const double area =
         slicer.tile(layer, {x0, y0, width, height}, rows, static_cast<std::ptrdiff_t>(stride), job->context);
     if (area_mm2 != nullptr) *area_mm2 = area;

@@ -2,6 +2,7 @@
  * The C interface from C: a block of 30 x 20 x 10 mm with crystal in it, its layers in strips, what it says of a wrong
  * recipe, and a cancelled job. Exit code 0 if all is as it should be. */
 #include <fibrolite/slicer.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,8 +60,13 @@ int main(void) {
   expect(counted > 0.999 * volume && counted < 1.001 * volume, "and so do pixels");
   expect(volume > 1500 && volume < 5000, "the block is neither empty nor full");
   expect(fibrolite_job_tile(job, 50, 0, 0, 1, 1, rows, 1, NULL) == FIBROLITE_BAD_ARGUMENT, "there is no layer 50");
+  expect(fibrolite_job_tile(job, 0, 0, 0, 1, 1, NULL, 1, NULL) == FIBROLITE_BAD_ARGUMENT, "there must be rows");
+  expect(fibrolite_job_tile(job, 0, 0, 0, 2, 1, rows, 1, NULL) == FIBROLITE_BAD_ARGUMENT, "rows hold the width");
+  expect(fibrolite_job_tile(job, 0, INT_MAX, 0, 1, 1, rows, 1, NULL) == FIBROLITE_BAD_ARGUMENT, "no pixel is so far");
+  expect(fibrolite_job_layers(NULL, &layers) == FIBROLITE_BAD_ARGUMENT, "there must be a job");
   free(rows);
   fibrolite_job_free(job);
+  fibrolite_job_free(NULL);
 
   job = fibrolite_job_new(NULL, NULL);
   options.recipe = "{\"tcs\": {\"cell\": 5}}";

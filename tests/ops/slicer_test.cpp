@@ -3,11 +3,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <future>
+#include <limits>
 #include <string>
 #include <thread>
 #include <vector>
@@ -161,6 +167,62 @@ TEST_F(SlicerOfABall, WhatIsNotThereIsABadArgument) {
   EXPECT_THAT(fibrolite_last_message(), HasSubstr("not open"));
 }
 
+TEST_F(SlicerOfABall, WhatDoesNotFitAnIntIsABadArgumentToo) {
+  std::uint8_t pixel = 7;
+  const auto tile = [&](int x, int y, int width, int height, std::size_t stride) {
+    return fibrolite_job_tile(job->get(), 0, x, y, width, height, &pixel, stride, nullptr);
+  };
+  constexpr int most = std::numeric_limits<int>::max();
+  EXPECT_EQ(tile(most, 0, 1, 1, 1), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(tile(0, most, 1, most, 1), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(tile(1, 0, most, 1, most), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(tile(0, 0, -1, 1, 1), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(tile(0, 0, 1, 1, SIZE_MAX), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_THAT(fibrolite_last_message(), HasSubstr("stride"));
+  EXPECT_EQ(pixel, 7) << "nothing is written";
+}
+
+TEST(Slicer, NullPointersAndEmptyMeshesAreRefused) {
+  const fibrolite_mesh given = as_c(ball);
+  const fibrolite_options options = quick();
+  const auto opened = [&](const fibrolite_mesh* mesh, const fibrolite_options& wanted) {
+    const Job job;
+    return fibrolite_job_open_mesh(job.get(), mesh, &wanted);
+  };
+  EXPECT_EQ(fibrolite_job_open_mesh(nullptr, &given, &options), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(fibrolite_job_open_file(nullptr, "a.stl", &options), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(opened(nullptr, options), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_THAT(fibrolite_last_message(), HasSubstr("no mesh"));
+  fibrolite_mesh part = given;
+  part.vertices = nullptr;
+  EXPECT_EQ(opened(&part, options), FIBROLITE_BAD_ARGUMENT);
+  part = given;
+  part.triangles = nullptr;
+  EXPECT_EQ(opened(&part, options), FIBROLITE_BAD_ARGUMENT);
+  part = given;
+  part.triangle_count = 0;
+  EXPECT_EQ(opened(&part, options), FIBROLITE_BAD_INPUT);
+  part.vertex_count = 0;
+  EXPECT_EQ(opened(&part, options), FIBROLITE_BAD_INPUT);
+  const Job job;
+  EXPECT_EQ(fibrolite_job_open_file(job.get(), nullptr, &options), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(fibrolite_job_layers(job.get(), nullptr), FIBROLITE_BAD_ARGUMENT);
+  std::uint8_t pixel = 0;
+  EXPECT_EQ(fibrolite_job_tile(nullptr, 0, 0, 0, 1, 1, &pixel, 1, nullptr), FIBROLITE_BAD_ARGUMENT);
+  EXPECT_EQ(fibrolite_job_tile(job.get(), 0, 0, 0, 1, 1, &pixel, 1, nullptr), FIBROLITE_BAD_ARGUMENT) << "not open";
+  fibrolite_job_cancel(nullptr);
+  fibrolite_job_free(nullptr);
+}
+
+TEST(Slicer, AJobMayBeCancelledByItsProgress) {
+  fibrolite_job* cancelled = nullptr;
+  const Job job([](double, const char*, void* user) { fibrolite_job_cancel(*static_cast<fibrolite_job**>(user)); },
+                &cancelled);
+  cancelled = job.get();
+  EXPECT_EQ(job.open(ball, quick()), FIBROLITE_CANCELLED);
+  EXPECT_EQ(job.open(ball, quick()), FIBROLITE_BAD_ARGUMENT) << "once per job, whatever came of it";
+}
+
 TEST(Slicer, SaysWhatIsWrongWithTheRequest) {
   const auto refused = [](const auto& change, const Mesh& mesh = ball) {
     fibrolite_options options = quick();
@@ -306,6 +368,35 @@ TEST(Slicer, WithLessMemoryThePixelsAreTheSameSlabBySlab) {
   params.fill.recipe.print.drain_mm.reset();
   params.max_memory_bytes = 60e6;
   EXPECT_THAT(refused(), HasSubstr("even slab by slab"));
+}
+
+/// A host that asks for layers in tasks of its own: a thread that waits for one layer's tasks takes up the host's next.
+TEST(Slicer, LayersOfSlabsMayBeAskedForInTasks) {
+  SlicerParams params;
+  params.fill.infill = InfillKind::Tcs;
+  params.fill.voxel_mm = 0.3;
+  params.pixel_mm = {0.4, 0.4};
+  params.layer_mm = 0.5;
+  params.max_memory_bytes = 85e6;
+  const Slicer slabs({.mesh = read_mesh(testing::asset("molar")).mesh, .unit_mm = 1, .notes = {}}, params);
+  constexpr int apart = 10;  // each change of slab takes a while
+  const int layers = slabs.grid().layers / apart;
+  std::vector<double> one(static_cast<std::size_t>(layers)), tasks = one;
+  for (int n = 0; n < layers; ++n) one[static_cast<std::size_t>(n)] = slabs.layer(apart * n).area_mm2;
+  std::promise<void> done;
+  std::thread host([&] {
+    // A task for each layer, so that there are others to take up while one waits.
+    tbb::parallel_for(
+        0, layers, [&](int n) { tasks[static_cast<std::size_t>(n)] = slabs.layer(apart * n).area_mm2; },
+        tbb::simple_partitioner{});
+    done.set_value();
+  });
+  if (done.get_future().wait_for(std::chrono::minutes(3)) != std::future_status::ready) {
+    std::fputs("the host's tasks wait for each other\n", stderr);
+    std::_Exit(1);  // its threads cannot be ended
+  }
+  host.join();
+  EXPECT_EQ(tasks, one);
 }
 
 TEST(Slicer, InCppThePixelsAreTheSame) {

@@ -17,7 +17,8 @@ extern "C" {
 /** What every function returns. The numbers are the exit codes of the program and stay. */
 typedef enum fibrolite_code {
   FIBROLITE_OK = 0,
-  FIBROLITE_BAD_ARGUMENT = 2, /**< A null pointer, a layer or tile that is not there, a job not open or opened twice. */
+  FIBROLITE_BAD_ARGUMENT = 2, /**< A null pointer, a layer or tile that is not there, a stride below the width, an `up`
+                                 that is none, a job not open or opened twice. Nothing was done. */
   FIBROLITE_BAD_INPUT = 3,    /**< The model is missing, unreadable or not a solid. */
   FIBROLITE_BAD_RECIPE = 4,   /**< Recipe, preset, infill, or a number of the options. */
   FIBROLITE_TOO_LARGE = 5,    /**< It does not fit the memory given, or there is none left. */
@@ -36,7 +37,8 @@ typedef enum fibrolite_up {
   FIBROLITE_UP_MINUS_Z
 } fibrolite_up;
 
-/** A model in memory; copied while it is opened. Corners may be repeated, they are welded. */
+/** A model in memory, in units of options.unit_mm; copied while it is opened. Corners may be repeated, they are welded.
+ * No coordinate may be infinite or none, no corner beyond vertex_count: FIBROLITE_BAD_INPUT names the first. */
 typedef struct fibrolite_mesh {
   const float* vertices; /**< x, y, z of each. */
   size_t vertex_count;
@@ -44,7 +46,8 @@ typedef struct fibrolite_mesh {
   size_t triangle_count;
 } fibrolite_mesh;
 
-/** Zero or NULL in any field is the default; `fibrolite_options options = {0};` is a whole set of them. */
+/** Zero or NULL in any field is the default; `fibrolite_options options = {0};` is a whole set of them. Lengths are mm,
+ * finite and above zero, else FIBROLITE_BAD_RECIPE. Nothing of it is needed any more once the job is open. */
 typedef struct fibrolite_options {
   const char* recipe;      /**< JSON, what `fibrolite recipe` prints or a part of it; laid over the preset. */
   const char* preset;      /**< "default". */
@@ -61,38 +64,47 @@ typedef struct fibrolite_options {
                               change of slab takes as long as making it. Refused if no slab fits. Default: no limit. */
 } fibrolite_options;
 
-/** What an open job holds. Pixel (0, 0) of layer 0 has its lower corner at `origin`; z along `up`. */
+/** What an open job holds. Pixel (0, 0) of layer 0 has its lower corner at `origin`; z along `up`. Pixel (x, y) of
+ * layer n covers x to x + 1 pixel_x_mm, y to y + 1 pixel_y_mm and n to n + 1 layer_mm from there along the axes. */
 typedef struct fibrolite_layers {
-  int layers, width, height; /**< Pixels of each layer. */
+  int layers, width, height; /**< Their number, and the pixels of each. */
   double layer_mm, pixel_x_mm, pixel_y_mm;
   double origin[3];                       /**< mm, in the model's frame. */
   double axis_x[3], axis_y[3], axis_z[3]; /**< Unit vectors of the layers' x, y and z in the model's frame. */
-  double volume_mm3;                      /**< Of the solid, as measured on its voxels. */
+  double volume_mm3;                      /**< mm3, of the solid, as measured on its voxels. */
 } fibrolite_layers;
 
 typedef struct fibrolite_job fibrolite_job; /**< A model being filled, then layers to ask for. */
 
-/** `fraction` 0 to 1, never falling, 1 at the end; from any thread, one call at a time. It must not throw. */
+/** `fraction` 0 to 1, never falling, 1 at the end; from any thread, one call at a time. `stage` is valid during the
+ * call. It must not throw, nor free the job; it may cancel it. */
 typedef void (*fibrolite_progress)(double fraction, const char* stage, void* user);
 
-/** NULL if there is no memory left. `progress` may be NULL. */
+/** NULL if there is no memory left. `progress` may be NULL; `user` is handed to it and not looked at. */
 fibrolite_job* fibrolite_job_new(fibrolite_progress progress, void* user);
-/** Fill the model: seconds to minutes. Once per job. `options` may be NULL. */
+/** Fill the model: seconds to minutes, on all cores. Once per job, whatever came of it: after a failure free the job
+ * and make another. `options` may be NULL. Jobs may be opened at the same time. */
 int fibrolite_job_open_mesh(fibrolite_job* job, const fibrolite_mesh* mesh, const fibrolite_options* options);
-/** The same from a file: .stl .obj .ply .off .3mf. */
+/** The same from a file: .stl .obj .ply .off .3mf; FIBROLITE_BAD_INPUT if it cannot be read. */
 int fibrolite_job_open_file(fibrolite_job* job, const char* path, const fibrolite_options* options);
+/** What there is to ask for. From any thread, once the job is open. */
 int fibrolite_job_layers(const fibrolite_job* job, fibrolite_layers* layers);
-/** A tile of a layer: pixel (x, y) goes to rows[(y - y0) * stride + x - x0] as 0 empty to 255 full. `stride` in bytes,
- * `width` or more. A tile's bytes are those of the whole layer at that place. Any number of threads may ask at once.
- * `area_mm2` may be NULL. */
+/** A tile of a layer: pixel (x, y) goes to rows[(y - y0) * stride + x - x0] as 0 empty to 255 full, so rows follow each
+ * other along axis_y: turn them round for a picture whose first row is its top. `stride` in bytes, `width` or more;
+ * `rows` holds (height - 1) * stride + width of them, and what lies between rows is left as it is. A tile's bytes are
+ * those of the whole layer at that place. `area_mm2` gets the tile's material in mm2, before it is rounded to 255
+ * steps; it may be NULL. Any number of threads may ask at once, for the same layer or others, tasks of TBB among them;
+ * one call alone uses all cores too. With max_memory_bytes who asks for another slab waits for those at work on this
+ * one, and the call may also fail with FIBROLITE_TOO_LARGE. After FIBROLITE_CANCELLED the rows are part done. */
 int fibrolite_job_tile(const fibrolite_job* job, int layer, int x0, int y0, int width, int height, uint8_t* rows,
                        size_t stride, double* area_mm2);
-/** From any thread: what runs returns FIBROLITE_CANCELLED within a second, and so does all that is asked later. */
+/** From any thread, a signal handler or `progress`, at any time: what runs returns FIBROLITE_CANCELLED within a second,
+ * and so does all that is asked later. NULL is fine. */
 void fibrolite_job_cancel(const fibrolite_job* job);
 /** After the last call has returned. NULL is fine. */
 void fibrolite_job_free(fibrolite_job* job);
-/** One line about the last call of this thread that did not return FIBROLITE_OK: WHAT (WHERE); TRY. Empty if none.
- * Valid until this thread's next such call. */
+/** One line of text, up to 1023 bytes, about the last call of this thread that did not return FIBROLITE_OK: WHAT
+ * (WHERE); TRY. Empty if none. Valid until this thread's next such call. Never NULL. */
 const char* fibrolite_last_message(void);
 
 #ifdef __cplusplus
