@@ -38,6 +38,9 @@ void validate(const Mesh& mesh, const ToSolidParams& params) {
   if (farthest / voxel > 1e9) {
     throw Error(Code::TooLarge, "more than 2^31 voxels along an axis", {}, "use a larger --voxel");
   }
+  constexpr double least_voxel_mm = 2e-5;  // OpenVDB takes no voxel below 3e-15 mm3
+  if (voxel < least_voxel_mm)
+    throw Error(Code::BadRecipe, "the voxel is below 2e-5 mm", "voxel", "use a larger --voxel, or a larger model");
 }
 
 Mesh turned_inside_out(Mesh mesh) {

@@ -164,10 +164,16 @@ void warn_about_units(Model& model) {
                              " mm: is its unit right? Try --unit or --size");
 }
 
-/// Coordinates are floats: far from the origin their steps are wider than what the model is made of.
+/// Voxels have a least edge. And coordinates are floats: far from the origin their steps are wider than what the model
+/// is made of.
 void check_place(const Mesh& mesh) {
   if (mesh.triangles.empty()) return;
+  constexpr double smallest_mm = 0.01;
   const Box3d box = used_box(mesh);
+  if (const double side = box.longest_side(); side > 0 && side < smallest_mm)
+    throw Error(Code::BadInput,
+                "the model is " + number_text(side, 3) + " mm long, less than a hundredth of a millimetre", "",
+                "is its unit right? Try --unit or --size");
   double farthest = 0;
   for (const Vec3d p : {box.min, box.max}) farthest = std::max({farthest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   const auto at = static_cast<float>(farthest);

@@ -460,6 +460,7 @@ TEST(ToSolid, refuses_grids_that_make_no_sense) {
   for (const double voxel : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_EQ(code_of(cube(20), {.grid = {.voxel_mm = voxel}}), Code::BadRecipe);
   }
+  EXPECT_EQ(code_of(cube(0.002), {.grid = {.voxel_mm = 1.4e-5}}), Code::BadRecipe);  // OpenVDB would throw its own
   EXPECT_EQ(code_of(cube(20), {.grid = {.voxel_mm = 0.5, .band_vox = 1}}), Code::BadRecipe);
   EXPECT_EQ(code_of(cube(20), {.grid = {.voxel_mm = 0.5}, .inside_band_mm = -1}), Code::BadRecipe);
   EXPECT_EQ(code_of(cube(20), {.grid = {.voxel_mm = 1e-9}}), Code::TooLarge);

@@ -77,6 +77,12 @@ TEST(Prepare, refuses_models_too_far_from_the_origin_for_their_coordinates) {
   EXPECT_NO_THROW((void)prepared(at(-6e4F), {.unit_mm = 1000}));  // in metres it is the same model
 }
 
+TEST(Prepare, refuses_models_too_small_for_voxels) {
+  EXPECT_EQ(refusal(cube(20), {.size_mm = 1e-9}), Code::BadInput);
+  EXPECT_EQ(refusal(cube(1e-30)), Code::BadInput);
+  EXPECT_NO_THROW((void)prepared(cube(20), {.size_mm = 0.011}));
+}
+
 TEST(Prepare, inside_out_models_are_turned_and_both_sides_give_the_same) {
   const Mesh mesh = torus_mesh(30, 10, 40, 20);
   const Model model = prepared(flipped(mesh));

@@ -24,8 +24,8 @@ struct ToSolidResult {
   std::vector<std::string> repairs;  ///< What had to be decided by winding number, in words; empty for a clean mesh.
 };
 /// @throws Error BadInput: the mesh encloses no volume (an open sheet, all triangles in one plane, thinner than the
-/// voxel); BadRecipe: voxel or band out of range; TooLarge: more than 2^31 voxels along an axis. Cost: O(triangles +
-/// band voxels), parallel; the same bits on any number of threads.
+/// voxel); BadRecipe: voxel (2e-5 mm or more) or band out of range; TooLarge: more than 2^31 voxels along an axis.
+/// Cost: O(triangles + band voxels), parallel; the same bits on any number of threads.
 [[nodiscard]] ToSolidResult to_solid(const Mesh& mesh, const ToSolidParams& params, const Context& context = {});
 
 /// The same solid a box at a time, for models whose whole band is too large for memory. Immutable, thread-safe; copies

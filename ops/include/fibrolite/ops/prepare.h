@@ -36,7 +36,7 @@ struct Model {
 /// be, and the whole by signed volume. Holes and self-intersections stay: to_solid() decides the inside by winding
 /// number.
 /// @throws Error BadInput: no triangles left, all in one plane, so far from the origin that coordinates are coarser
-/// than a 4000th of the model; BadRecipe: a range above.
+/// than a 4000th of the model, shorter than 0.01 mm; BadRecipe: a range above.
 [[nodiscard]] Model prepare(const MeshFile& file, const PrepareParams& params, const Context& context = {});
 
 }  // namespace fibrolite
