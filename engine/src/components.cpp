@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <numeric>
 
 #include "fibrolite/error.h"
@@ -13,14 +14,29 @@
 namespace fibrolite {
 namespace {
 
-constexpr std::array<openvdb::Index, 3> stride{64, 8, 1};  // of x, y, z in a leaf's buffer
+constexpr std::uint64_t first_column = 0x0101010101010101U;
 
-/// A leaf's samples as bits: bit 8 y + z of word x.
-using Bits = std::array<std::uint64_t, 8>;
+/// The lowest bit of each byte, side by side; the others must be zero.
+constexpr std::uint64_t lowest_of_bytes(std::uint64_t bytes) { return (bytes * 0x0102040810204080U) >> 56; }
+
+/// Which samples of a leaf are less than `below`.
+[[gnu::target_clones("avx2", "default")]] LeafBits bits_below(const float* value, float below) {
+  LeafBits bits{};
+  for (std::size_t x = 0; x < 8; ++x) {
+    std::array<std::uint8_t, 64> less;
+    for (std::size_t i = 0; i < 64; ++i) less[i] = value[64 * x + i] < below ? 1 : 0;
+    for (std::size_t y = 0; y < 8; ++y) {
+      std::uint64_t eight = 0;
+      std::memcpy(&eight, less.data() + 8 * y, 8);
+      bits[x] |= lowest_of_bytes(eight) << (8 * y);
+    }
+  }
+  return bits;
+}
+static_assert(std::endian::native == std::endian::little);
 
 /// All of `within` that hangs together with what is set in `grown`. Whole planes move at a time.
-void flood(Bits& grown, const Bits& within) {
-  constexpr std::uint64_t first_column = 0x0101010101010101U;
+void flood(LeafBits& grown, const LeafBits& within) {
   for (bool changed = true; changed;) {
     changed = false;
     const auto spread = [&](std::size_t x, std::uint64_t from) {
@@ -38,41 +54,48 @@ void flood(Bits& grown, const Bits& within) {
   }
 }
 
-LeafLabels label_leaf(const float* value, float below) {
-  LeafLabels result;
-  result.label.fill(0);
-  Bits inside;
-  for (std::size_t x = 0; x < 8; ++x) {
-    std::uint64_t word = 0;
-    for (std::size_t i = 0; i < 64; ++i) word |= std::uint64_t{value[64 * x + i] < below} << i;
-    inside[x] = word;
-  }
-  Bits open;
+/// Appends the labels of a leaf, in scan order.
+void label_leaf(const float* value, float below, std::vector<LeafSet>& sets) {
+  const LeafBits inside = bits_below(value, below);
+  LeafBits open;
   open.fill(~std::uint64_t{0});
   for (std::size_t x = 0; x < 8; ++x) {
     while (open[x] != 0) {
       const auto bit = static_cast<std::size_t>(std::countr_zero(open[x]));
       const bool in = (inside[x] >> bit & 1U) != 0;
-      Bits within, grown{};
+      LeafBits within;
       for (std::size_t w = 0; w < 8; ++w) within[w] = open[w] & (in ? inside[w] : ~inside[w]);
-      grown[x] = std::uint64_t{1} << bit;
-      flood(grown, within);
-      const auto id = static_cast<std::uint16_t>(result.voxels.size());
-      int count = 0;
-      for (std::size_t w = 0; w < 8; ++w) {
-        open[w] &= ~grown[w];
-        count += std::popcount(grown[w]);
-        for (std::uint64_t rest = id > 0 ? grown[w] : 0; rest != 0; rest &= rest - 1)
-          result.label[64 * w + static_cast<std::size_t>(std::countr_zero(rest))] = id;
-      }
-      result.voxels.push_back(static_cast<std::uint16_t>(count));
-      result.first.push_back(static_cast<std::uint16_t>(64 * x + bit));
+      LeafSet& set = sets.emplace_back(LeafSet{{}, in});
+      set.bits[x] = std::uint64_t{1} << bit;
+      flood(set.bits, within);
+      for (std::size_t w = 0; w < 8; ++w) open[w] &= ~set.bits[w];
     }
   }
-  return result;
 }
 
 }  // namespace
+
+int LeafSet::voxels() const {
+  int count = 0;
+  for (const std::uint64_t word : bits) count += std::popcount(word);
+  return count;
+}
+
+unsigned LeafSet::first() const {
+  unsigned x = 0;
+  while (bits[x] == 0) ++x;
+  return 64 * x + static_cast<unsigned>(std::countr_zero(bits[x]));
+}
+
+std::uint64_t LeafSet::face(unsigned axis, bool upper) const {
+  const unsigned layer = upper ? 7 : 0;
+  if (axis == 0) return bits[layer];
+  std::uint64_t face = 0;
+  for (unsigned x = 0; x < 8; ++x) {
+    face |= (axis == 1 ? bits[x] >> (8 * layer) & 255U : lowest_of_bytes(bits[x] >> layer & first_column)) << (8 * x);
+  }
+  return face;
+}
 
 Components::Components(const Solid& solid, const Context& context, float below, const SampleRange* range)
     : solid_(solid), below_(below) {
@@ -102,22 +125,21 @@ Components::Components(const Solid& solid, const Context& context, float below, 
 std::vector<Components::Component> Components::list() const {
   std::vector<Component> result;
   std::vector<std::int64_t> slot(parent_.size(), -1);
-  for (std::size_t b = 0; b < block_.size(); ++b) {
-    const Id count = offset_[b + 1] - offset_[b];
-    for (Id k = 0; k < count; ++k) {
-      const Id root = find(offset_[b] + k);
-      const std::int64_t voxels = block_[b] >= 0 ? leaves_[static_cast<std::size_t>(block_[b])].voxels[k] : Leaf::SIZE;
+  each_block([&](const openvdb::Coord& origin, const LeafLabels* labels, Id offset) {
+    const std::size_t count = labels != nullptr ? labels->sets.size() : 1;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Id root = find(offset + static_cast<Id>(k));
       if (slot[root] < 0) {
         slot[root] = static_cast<std::int64_t>(result.size());
-        const unsigned first = block_[b] >= 0 ? leaves_[static_cast<std::size_t>(block_[b])].first[k] : 0U;
+        const unsigned first = labels != nullptr ? labels->sets[k].first() : 0;
         const openvdb::Coord at =
-            origin(b) + openvdb::Coord(static_cast<int>(first >> 6), static_cast<int>((first >> 3) & 7U),
-                                       static_cast<int>(first & 7U));
+            origin + openvdb::Coord(static_cast<int>(first >> 6), static_cast<int>((first >> 3) & 7U),
+                                    static_cast<int>(first & 7U));
         result.push_back({root, inside(at), 0, at});
       }
-      result[static_cast<std::size_t>(slot[root])].voxels += voxels;
+      result[static_cast<std::size_t>(slot[root])].voxels += labels != nullptr ? labels->sets[k].voxels() : Leaf::SIZE;
     }
-  }
+  });
   return result;
 }
 
@@ -126,7 +148,7 @@ Components::Id Components::at(const openvdb::Coord& ijk) const {
   if (b.x() < 0 || b.y() < 0 || b.z() < 0 || b.x() >= n_.x() || b.y() >= n_.y() || b.z() >= n_.z()) return find(0);
   const std::size_t i = index(b);
   if (block_[i] < 0) return find(offset_[i]);
-  return find(offset_[i] + leaves_[static_cast<std::size_t>(block_[i])].label[Leaf::coordToOffset(ijk)]);
+  return find(offset_[i] + static_cast<Id>(labels_of(block_[i]).at(Leaf::coordToOffset(ijk))));
 }
 
 openvdb::Coord Components::origin(std::size_t b) const {
@@ -169,18 +191,25 @@ void Components::find_blocks(const Tree& tree) {
 }
 
 void Components::label(const Context& context) {
-  leaves_.resize(tree_leaves_.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves_.size(), 64), [&](const auto& range) {
+  chunks_.resize((tree_leaves_.size() + chunk_size - 1) / chunk_size);
+  tbb::parallel_for(std::size_t{0}, chunks_.size(), [&](std::size_t c) {
     if (context.cancelled()) return;
-    for (std::size_t i = range.begin(); i < range.end(); ++i)
-      leaves_[i] = label_leaf(tree_leaves_[i]->buffer().data(), below_);
+    thread_local std::vector<LeafSet> room;
+    room.clear();
+    Chunk& chunk = chunks_[c];
+    for (std::size_t i = 0; i < chunk_size; ++i) {
+      const std::size_t leaf = c * chunk_size + i;
+      if (leaf < tree_leaves_.size()) label_leaf(tree_leaves_[leaf]->buffer().data(), below_, room);
+      chunk.start[i + 1] = static_cast<std::uint16_t>(room.size());
+    }
+    chunk.sets = room;
   });
   context.check();
   offset_.resize(block_.size() + 1);
   Id next = 0;
   for (std::size_t b = 0; b < block_.size(); ++b) {
     offset_[b] = next;
-    next += block_[b] >= 0 ? static_cast<Id>(leaves_[static_cast<std::size_t>(block_[b])].voxels.size()) : 1U;
+    next += block_[b] >= 0 ? static_cast<Id>(labels_of(block_[b]).sets.size()) : 1U;
   }
   offset_.back() = next;
   parent_.resize(next);
@@ -202,16 +231,32 @@ Components::Id Components::root_of(Id i) {
 }
 
 void Components::join() {
-  for (int x = 0; x < n_.x(); ++x) {
-    for (int y = 0; y < n_.y(); ++y) {
-      for (int z = 0; z < n_.z(); ++z) {
-        const std::size_t b = index(openvdb::Coord(x, y, z));
-        if (x + 1 < n_.x()) join_faces(b, index(openvdb::Coord(x + 1, y, z)), 0);
-        if (y + 1 < n_.y()) join_faces(b, index(openvdb::Coord(x, y + 1, z)), 1);
-        if (z + 1 < n_.z()) join_faces(b, index(openvdb::Coord(x, y, z + 1)), 2);
-      }
+  // Blocks are numbered along x, and so are labels: each share joins its own, then the shares are joined.
+  const int shares = std::min(n_.x(), 16);
+  const auto first = [&](int share) { return n_.x() * share / shares; };
+  tbb::parallel_for(0, shares, [&](int share) {
+    for (int x = first(share); x < first(share + 1); ++x) {
+      if (x > first(share)) join_to_next(x - 1);
+      join_across(x);
+    }
+  });
+  for (int share = 1; share < shares; ++share) join_to_next(first(share) - 1);
+  for (Id i = 0; i < parent_.size(); ++i) parent_[i] = parent_[parent_[i]];  // a parent is smaller, and done already
+}
+
+/// The blocks of a layer, along y and z.
+void Components::join_across(int x) {
+  std::size_t b = index(openvdb::Coord(x, 0, 0));
+  for (int y = 0; y < n_.y(); ++y) {
+    for (int z = 0; z < n_.z(); ++z, ++b) {
+      if (y + 1 < n_.y()) join_faces(b, b + static_cast<std::size_t>(n_.z()), 1);
+      if (z + 1 < n_.z()) join_faces(b, b + 1, 2);
     }
   }
+}
+void Components::join_to_next(int x) {
+  const std::size_t end = index(openvdb::Coord(x + 1, 0, 0)), layer = end - index(openvdb::Coord(x, 0, 0));
+  for (std::size_t b = end - layer; b < end; ++b) join_faces(b, b + layer, 0);
 }
 
 /// `b` lies after `a` along `axis`.
@@ -220,26 +265,32 @@ void Components::join_faces(std::size_t a, std::size_t b, unsigned axis) {
     if (block_[a] == block_[b]) unite(offset_[a], offset_[b]);
     return;
   }
-  const float* va = block_[a] >= 0 ? tree_leaves_[static_cast<std::size_t>(block_[a])]->buffer().data() : nullptr;
-  const float* vb = block_[b] >= 0 ? tree_leaves_[static_cast<std::size_t>(block_[b])]->buffer().data() : nullptr;
-  const unsigned s = stride[axis], u = stride[(axis + 1) % 3], v = stride[(axis + 2) % 3];
-  Id last_a = 0, last_b = 0;
-  bool any = false;
-  for (unsigned i = 0; i < 8; ++i) {
-    for (unsigned j = 0; j < 8; ++j) {
-      const unsigned pa = 7 * s + i * u + j * v, pb = i * u + j * v;
-      const bool ia = va != nullptr ? va[pa] < below_ : block_[a] == full_tile;
-      const bool ib = vb != nullptr ? vb[pb] < below_ : block_[b] == full_tile;
-      if (ia != ib) continue;
-      const Id la = offset_[a] + (va != nullptr ? leaves_[static_cast<std::size_t>(block_[a])].label[pa] : 0U);
-      const Id lb = offset_[b] + (vb != nullptr ? leaves_[static_cast<std::size_t>(block_[b])].label[pb] : 0U);
-      if (any && la == last_a && lb == last_b) continue;  // neighbours on a face mostly repeat
-      unite(la, lb);
-      last_a = la;
-      last_b = lb;
-      any = true;
+  struct Side {
+    std::array<std::uint64_t, 64> face;
+    std::array<Id, 64> id;
+    std::array<bool, 64> inside;
+    std::size_t count = 0;
+  };
+  const auto side = [&](std::size_t block, bool upper) {
+    Side found;
+    const auto take = [&](std::uint64_t face, Id id, bool inside) {
+      if (face == 0) return;
+      found.face[found.count] = face;
+      found.id[found.count] = id;
+      found.inside[found.count++] = inside;
+    };
+    if (block_[block] < 0) {
+      take(~std::uint64_t{0}, offset_[block], block_[block] == full_tile);
+    } else {
+      Id id = offset_[block];
+      for (const LeafSet& set : labels_of(block_[block]).sets) take(set.face(axis, upper), id++, set.inside);
     }
-  }
+    return found;
+  };
+  const Side below = side(a, true), above = side(b, false);
+  for (std::size_t i = 0; i < below.count; ++i)
+    for (std::size_t j = 0; j < above.count; ++j)
+      if (below.inside[i] == above.inside[j] && (below.face[i] & above.face[j]) != 0) unite(below.id[i], above.id[j]);
 }
 
 Vec3d world_mm(const openvdb::Coord& c, double voxel_mm) {

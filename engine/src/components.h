@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "fibrolite/context.h"
@@ -17,12 +18,31 @@
 
 namespace fibrolite {
 
+/// A leaf's samples as bits: bit 8 y + z of word x.
+using LeafBits = std::array<std::uint64_t, 8>;
+
+/// Samples of one label.
+struct LeafSet {
+  LeafBits bits;
+  bool inside;
+
+  [[nodiscard]] int voxels() const;
+  [[nodiscard]] unsigned first() const;  ///< Its first sample: 64 x + 8 y + z.
+  /// Of the lowest or highest layer along an axis, in an order that depends on the axis alone.
+  [[nodiscard]] std::uint64_t face(unsigned axis, bool upper) const;
+};
+
 /// One leaf's labels, dense from 0 in scan order.
 struct LeafLabels {
   static constexpr std::size_t size = 512;
-  std::array<std::uint16_t, size> label;
-  std::vector<std::uint16_t> voxels;  // per label
-  std::vector<std::uint16_t> first;   // per label: its first voxel
+  std::span<const LeafSet> sets;
+
+  /// Of sample 64 x + 8 y + z.
+  [[nodiscard]] std::size_t at(std::size_t sample) const {
+    std::size_t k = 0;
+    while ((sets[k].bits[sample >> 6] >> (sample & 63U) & 1U) == 0) ++k;
+    return k;
+  }
 };
 
 /// All 8x8x8 blocks of the solid's box and one layer around it, with globally joined labels. Inside is what reads less
@@ -57,16 +77,20 @@ class Components {
   template <class Visit>
   void each_block(const Visit& visit) const {
     for (std::size_t b = 0; b < block_.size(); ++b) {
-      visit(origin(b), block_[b] >= 0 ? &leaves_[static_cast<std::size_t>(block_[b])] : nullptr, offset_[b]);
+      const LeafLabels labels = block_[b] >= 0 ? labels_of(block_[b]) : LeafLabels{};
+      visit(origin(b), block_[b] >= 0 ? &labels : nullptr, offset_[b]);
     }
   }
-  [[nodiscard]] Id find(Id i) const {
-    while (parent_[i] != i) i = parent_[i];
-    return i;
-  }
+  [[nodiscard]] Id find(Id i) const { return parent_[i]; }
 
  private:
   static constexpr std::int32_t void_tile = -1, full_tile = -2;
+  /// Labels of neighbouring leaves: two or three for most of them, 72 bytes each.
+  static constexpr std::size_t chunk_size = 64;
+  struct Chunk {
+    std::vector<LeafSet> sets;
+    std::array<std::uint16_t, chunk_size + 1> start{};
+  };
 
   [[nodiscard]] std::size_t index(const openvdb::Coord& b) const {
     return (static_cast<std::size_t>(b.x()) * static_cast<std::size_t>(n_.y()) + static_cast<std::size_t>(b.y())) *
@@ -74,9 +98,17 @@ class Components {
            static_cast<std::size_t>(b.z());
   }
   [[nodiscard]] openvdb::Coord origin(std::size_t b) const;
+  [[nodiscard]] LeafLabels labels_of(std::int32_t leaf) const {
+    const auto n = static_cast<std::size_t>(leaf);
+    const Chunk& chunk = chunks_[n / chunk_size];
+    const std::size_t from = chunk.start[n % chunk_size], to = chunk.start[n % chunk_size + 1];
+    return {{chunk.sets.data() + from, to - from}};
+  }
   void find_blocks(const Tree& tree);
   void label(const Context& context);
   void join();
+  void join_across(int x);
+  void join_to_next(int x);
   void join_faces(std::size_t a, std::size_t b, unsigned axis);
   void unite(Id a, Id b);
   Id root_of(Id i);
@@ -86,9 +118,9 @@ class Components {
   openvdb::Coord low_, n_;
   std::vector<std::int32_t> block_;  // leaf number or a tile kind
   std::vector<const Leaf*> tree_leaves_;
-  std::vector<LeafLabels> leaves_;
+  std::vector<Chunk> chunks_;
   std::vector<Id> offset_;  // first global id of each block
-  std::vector<Id> parent_;
+  std::vector<Id> parent_;  // the root itself, once all are joined
 };
 
 [[nodiscard]] Vec3d world_mm(const openvdb::Coord& c, double voxel_mm);

@@ -4,11 +4,10 @@
 #include <openvdb/openvdb.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <bit>
 #include <map>
-#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -91,11 +90,6 @@ struct PieceSweep::Impl {
   [[nodiscard]] std::pair<int, int> across(const Coord& origin) const {
     return {origin[(axis + 1) % 3], origin[(axis + 2) % 3]};
   }
-  /// Sample `n` of a block's lowest or highest layer.
-  [[nodiscard]] std::size_t sample(unsigned n, bool upper) const {
-    constexpr std::array<unsigned, 3> stride{64, 8, 1};
-    return (upper ? 7 * stride[axis] : 0) + (n >> 3) * stride[(axis + 1) % 3] + (n & 7U) * stride[(axis + 2) % 3];
-  }
 
   void join_faces(const Face& a, const Face& b) {
     for (std::size_t n = 0; n < 64; ++n) {
@@ -145,7 +139,7 @@ struct PieceSweep::Impl {
     }
     std::vector<Id> id;
     components.each_block([&](const Coord& origin, const LeafLabels* labels, Id offset) {
-      const std::size_t kinds = labels != nullptr ? labels->voxels.size() : 1;
+      const std::size_t kinds = labels != nullptr ? labels->sets.size() : 1;
       id.resize(kinds);
       bool all_outside = true;
       for (std::size_t k = 0; k < kinds; ++k) {
@@ -215,9 +209,11 @@ struct PieceSweep::Impl {
 
   [[nodiscard]] Face face(const LeafLabels* labels, const std::vector<Id>& id, bool upper) const {
     Face result;
-    for (unsigned n = 0; n < 64; ++n) {
-      result.id[n] = id[labels != nullptr ? labels->label[sample(n, upper)] : 0];
-      result.inside |= std::uint64_t{sets[result.id[n]].inside} << n;
+    for (std::size_t k = 0; k < id.size(); ++k) {
+      const std::uint64_t mine = labels != nullptr ? labels->sets[k].face(params.axis, upper) : ~std::uint64_t{0};
+      for (std::uint64_t rest = mine; rest != 0; rest &= rest - 1)
+        result.id[static_cast<std::size_t>(std::countr_zero(rest))] = id[k];
+      if (sets[id[k]].inside) result.inside |= mine;
     }
     return result;
   }
@@ -236,8 +232,7 @@ struct PieceSweep::Impl {
       const bool here = !set.samples.empty() && set.samples.back().origin == Vec3i{origin.x(), origin.y(), origin.z()};
       Flips::Block& block = here ? set.samples.back() : set.samples.emplace_back();
       block.origin = {origin.x(), origin.y(), origin.z()};
-      for (std::size_t i = 0; i < LeafLabels::size; ++i)
-        if (labels->label[i] == k) block.which[i >> 6] |= std::uint64_t{1} << (i & 63U);
+      for (std::size_t w = 0; w < block.which.size(); ++w) block.which[w] |= labels->sets[k].bits[w];
     }
   }
 
@@ -257,7 +252,7 @@ struct PieceSweep::Impl {
     const Vec3i leaf{origin.x(), origin.y(), origin.z()};
     anchor.evaluate({x.data(), y.data(), z.data(), PointBlock::capacity, &leaf, h}, value.data());
     for (std::size_t i = 0; i < LeafLabels::size; ++i) {
-      const Id at = id[labels != nullptr ? labels->label[i] : 0];
+      const Id at = id[labels != nullptr ? labels->at(i) : 0];
       if (value[i] < 0 && sets[at].inside) sets[at].held = true;
     }
   }
@@ -349,22 +344,6 @@ void PieceSweep::add(const Solid& solid, int low, int high, const Shape& anchor,
   const SampleRange range{impl_->params.axis, low, high};
   impl_->add(impl_->components_of(solid, range, context), range, anchor, impl_->params.skin_mm > 0 ? &solid : nullptr,
              context);
-}
-
-void PieceSweep::add(const Solid& solid, const std::vector<SampleRange>& ranges, const Context& context) {
-  // Joining labels runs on one thread, but for each range on its own.
-  const auto at_once = static_cast<std::size_t>(std::max(tbb::this_task_arena::max_concurrency(), 1));
-  for (std::size_t from = 0; from < ranges.size(); from += at_once) {
-    context.check();
-    std::vector<std::optional<Components>> found(std::min(at_once, ranges.size() - from));
-    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
-      found[i].emplace(impl_->components_of(solid, ranges[from + i], context.part(0, 0, "")));
-    });
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      impl_->add(*found[i], ranges[from + i], nothing(), nullptr, context);
-      found[i].reset();
-    }
-  }
 }
 
 PieceSweep::Result PieceSweep::finish() { return impl_->finish(); }

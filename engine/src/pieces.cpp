@@ -100,15 +100,8 @@ CleanResult clean(Solid solid, const CleanParams& params, const Context& context
   openvdb::CoordBBox box;
   solid.impl().grid->tree().evalActiveVoxelBoundingBox(box);
   if (box.empty()) return {std::move(solid), 0, 0, {}};
-  // Labels take half as much as the solid: those of a slab at a time, if it may be cut.
-  constexpr int thickness = 32, few = 512;
   PieceSweep sweep(solid.grid(), {.axis = 0, .clean = params});
-  const int from = (box.min().x() & ~7) - 8, to = (box.max().x() | 7) + 9;
-  const bool cut = std::max(params.drop_below_vox, params.fill_below_vox) <= few;
-  std::vector<SampleRange> ranges;
-  for (int low = from; low < to; low += cut ? thickness : to - from)
-    ranges.push_back({0, low, cut ? std::min(low + thickness, to) : to});
-  sweep.add(solid, ranges, context);
+  sweep.add(solid, (box.min().x() & ~7) - 8, (box.max().x() | 7) + 9, nothing(), context);
   PieceSweep::Result found = sweep.finish();
   CleanResult result{flipped(std::move(solid), found.flips), found.dropped, found.filled, std::move(found.left)};
   // A void that was filled may have been all that kept two pieces apart.

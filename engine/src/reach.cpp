@@ -39,10 +39,11 @@ Anchored find_anchored(const Components& components, const std::vector<Component
   std::sort(found.ids.begin(), found.ids.end());
   found.reached.assign(found.ids.size(), false);
   const std::size_t none = found.ids.size();
+  std::vector<std::size_t> open;
   components.each_block([&](const Coord& origin, const LeafLabels* labels, Id offset) {
     // Most blocks hold nothing but what is known to be reached: no need to ask for the anchor there.
-    const std::size_t kinds = labels != nullptr ? labels->voxels.size() : 1;
-    std::vector<std::size_t> open(kinds, none);
+    const std::size_t kinds = labels != nullptr ? labels->sets.size() : 1;
+    open.assign(kinds, none);
     bool any = false;
     for (std::size_t k = 0; k < kinds; ++k) {
       open[k] = found.slot(components.find(offset + static_cast<Id>(k)));
@@ -57,7 +58,7 @@ Anchored find_anchored(const Components& components, const std::vector<Component
     const Vec3i leaf{origin.x(), origin.y(), origin.z()};
     anchor.evaluate({x.data(), y.data(), z.data(), Leaf::SIZE, &leaf, voxel_mm}, value.data());
     for (std::size_t i = 0; i < Leaf::SIZE; ++i) {
-      const std::size_t slot = open[labels != nullptr ? labels->label[i] : 0];
+      const std::size_t slot = open[labels != nullptr ? labels->at(i) : 0];
       if (slot < none && value[i] < 0) found.reached[slot] = true;
     }
   });

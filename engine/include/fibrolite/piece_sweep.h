@@ -41,8 +41,6 @@ class PieceSweep {
   /// Pieces with a sample where `anchor` is negative are held. Cost: as pieces(), plus the slab's last layer of samples
   /// in memory.
   void add(const Solid& solid, int low, int high, const Shape& anchor = nothing(), const Context& context = {});
-  /// The next slabs, without an anchor, as many at once as there are threads.
-  void add(const Solid& solid, const std::vector<SampleRange>& ranges, const Context& context = {});
 
   struct Result {
     /// But for specks that go and voids that are filled; the same, however the solid was cut. A void that is filled may
