@@ -6,8 +6,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
+
+#include "leaf_bits.h"
 
 namespace fibrolite {
 namespace {
@@ -16,35 +19,36 @@ using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 using openvdb::Coord;
 
-constexpr int size = static_cast<int>(Leaf::SIZE);
-constexpr std::array<int, 3> strides{64, 8, 1};
+/// Of two values on different sides.
+bool contradict(float a, float b, float limit) { return (a - b) * (a - b) > limit * limit; }
 
-bool contradict(float a, float b, float limit) { return (a < 0) != (b < 0) && (a - b) * (a - b) > limit * limit; }
-
-/// On one side only: nothing within can contradict.
-bool uniform(const float* v) {
-  int negative = 0;
-  for (int i = 0; i < size; ++i) negative += v[i] < 0 ? 1 : 0;
-  return negative == 0 || negative == size;
-}
-
-bool within(const float* v, float limit) {
-  for (const int stride : strides) {
-    for (int i = 0; i < size; ++i) {
-      if ((i / stride & 7) < 7 && contradict(v[i], v[i + stride], limit)) return true;
-    }
+/// `side`: which are negative.
+bool within(const float* v, const LeafBits& side, float limit) {
+  constexpr std::uint64_t last_column = first_column << 7, last_row = std::uint64_t{255} << 56;
+  for (std::size_t x = 0; x < 8; ++x) {
+    const std::uint64_t here = side[x];
+    const auto any = [&](std::uint64_t crossed, std::size_t step) {
+      for (; crossed != 0; crossed &= crossed - 1) {
+        const std::size_t at = 64 * x + static_cast<std::size_t>(std::countr_zero(crossed));
+        if (contradict(v[at], v[at + step], limit)) return true;
+      }
+      return false;
+    };
+    if (any((here ^ here >> 1) & ~last_column, 1) || any((here ^ here >> 8) & ~last_row, 8) ||
+        any(x < 7 ? here ^ side[x + 1] : 0, 64))
+      return true;
   }
   return false;
 }
 
 /// Between a leaf's face and the samples beyond it: `other` are a leaf's values, or one value that stands for all.
-bool across(const float* v, bool upper, const float* other, float tile, int stride, float limit) {
-  const int outer = 512 / (stride * 8), from = upper ? 7 * stride : 0, to = upper ? 0 : 7 * stride;
-  for (int i = 0; i < outer; ++i) {
-    for (int j = 0; j < stride; ++j) {
-      const int at = i * stride * 8 + j;
-      if (contradict(v[at + from], other != nullptr ? other[at + to] : tile, limit)) return true;
-    }
+bool across(const float* v, const LeafBits& side, bool upper, const float* other, float tile, unsigned axis,
+            float limit) {
+  const std::uint64_t beyond = other != nullptr ? face_of(bits_below(other, 0), axis, !upper) : tile < 0 ? ~0ULL : 0;
+  for (std::uint64_t crossed = face_of(side, axis, upper) ^ beyond; crossed != 0; crossed &= crossed - 1) {
+    const auto n = static_cast<unsigned>(std::countr_zero(crossed));
+    const float next = other != nullptr ? other[sample_of_face(n, axis, !upper)] : tile;
+    if (contradict(v[sample_of_face(n, axis, upper)], next, limit)) return true;
   }
   return false;
 }
@@ -128,7 +132,8 @@ std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openv
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const Leaf& leaf = leaves.leaf(i);
       const float* v = leaf.buffer().data();
-      unsigned bits = !uniform(v) && within(v, limit) ? 64U : 0U;
+      const LeafBits side = bits_below(v, 0);
+      unsigned bits = within(v, side, limit) ? 64U : 0U;
       for (int face = 0; face < 6; ++face) {
         const Coord place = neighbour(leaf.origin(), face);
         if (!box.isInside(place)) continue;
@@ -137,7 +142,7 @@ std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openv
         if (next != nullptr && !upper) continue;  // seen from there
         const float tile = next != nullptr ? 0 : access.getValue(place);
         const float* other = next != nullptr ? next->buffer().data() : nullptr;
-        if (across(v, upper, other, tile, strides[static_cast<std::size_t>(face / 2)], limit)) bits |= 1U << face;
+        if (across(v, side, upper, other, tile, static_cast<unsigned>(face / 2), limit)) bits |= 1U << face;
       }
       found[i] = static_cast<unsigned char>(bits);
     }

@@ -6,34 +6,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <numeric>
 
 #include "fibrolite/error.h"
 
 namespace fibrolite {
 namespace {
-
-constexpr std::uint64_t first_column = 0x0101010101010101U;
-
-/// The lowest bit of each byte, side by side; the others must be zero.
-constexpr std::uint64_t lowest_of_bytes(std::uint64_t bytes) { return (bytes * 0x0102040810204080U) >> 56; }
-
-/// Which samples of a leaf are less than `below`.
-[[gnu::target_clones("avx2", "default")]] LeafBits bits_below(const float* value, float below) {
-  LeafBits bits{};
-  for (std::size_t x = 0; x < 8; ++x) {
-    std::array<std::uint8_t, 64> less;
-    for (std::size_t i = 0; i < 64; ++i) less[i] = value[64 * x + i] < below ? 1 : 0;
-    for (std::size_t y = 0; y < 8; ++y) {
-      std::uint64_t eight = 0;
-      std::memcpy(&eight, less.data() + 8 * y, 8);
-      bits[x] |= lowest_of_bytes(eight) << (8 * y);
-    }
-  }
-  return bits;
-}
-static_assert(std::endian::native == std::endian::little);
 
 /// All of `within` that hangs together with what is set in `grown`. Whole planes move at a time.
 void flood(LeafBits& grown, const LeafBits& within) {
@@ -85,16 +63,6 @@ unsigned LeafSet::first() const {
   unsigned x = 0;
   while (bits[x] == 0) ++x;
   return 64 * x + static_cast<unsigned>(std::countr_zero(bits[x]));
-}
-
-std::uint64_t LeafSet::face(unsigned axis, bool upper) const {
-  const unsigned layer = upper ? 7 : 0;
-  if (axis == 0) return bits[layer];
-  std::uint64_t face = 0;
-  for (unsigned x = 0; x < 8; ++x) {
-    face |= (axis == 1 ? bits[x] >> (8 * layer) & 255U : lowest_of_bytes(bits[x] >> layer & first_column)) << (8 * x);
-  }
-  return face;
 }
 
 Components::Components(const Solid& solid, const Context& context, float below, const SampleRange* range)
@@ -283,7 +251,7 @@ void Components::join_faces(std::size_t a, std::size_t b, unsigned axis) {
       take(~std::uint64_t{0}, offset_[block], block_[block] == full_tile);
     } else {
       Id id = offset_[block];
-      for (const LeafSet& set : labels_of(block_[block]).sets) take(set.face(axis, upper), id++, set.inside);
+      for (const LeafSet& set : labels_of(block_[block]).sets) take(face_of(set.bits, axis, upper), id++, set.inside);
     }
     return found;
   };

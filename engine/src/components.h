@@ -14,12 +14,10 @@
 #include "fibrolite/pieces.h"
 #include "fibrolite/shape.h"
 #include "fibrolite/solid.h"
+#include "leaf_bits.h"
 #include "vdb_access.h"
 
 namespace fibrolite {
-
-/// A leaf's samples as bits: bit 8 y + z of word x.
-using LeafBits = std::array<std::uint64_t, 8>;
 
 /// Samples of one label.
 struct LeafSet {
@@ -28,8 +26,6 @@ struct LeafSet {
 
   [[nodiscard]] int voxels() const;
   [[nodiscard]] unsigned first() const;  ///< Its first sample: 64 x + 8 y + z.
-  /// Of the lowest or highest layer along an axis, in an order that depends on the axis alone.
-  [[nodiscard]] std::uint64_t face(unsigned axis, bool upper) const;
 };
 
 /// One leaf's labels, dense from 0 in scan order.

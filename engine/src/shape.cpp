@@ -20,29 +20,6 @@ struct Constant final : Shape::Function {
   float value;
 };
 
-struct Range {
-  float low, high;
-};
-/// Eight side by side, for the compiler.
-[[gnu::target_clones("avx2", "default")]] Range range_of(const float* v, int count) {
-  std::array<float, 8> low, high;
-  low.fill(v[0]);
-  high.fill(v[0]);
-  int i = 0;
-  for (; i + 8 <= count; i += 8) {
-    for (std::size_t k = 0; k < 8; ++k) {
-      const float x = v[static_cast<std::size_t>(i) + k];
-      low[k] = x < low[k] ? x : low[k];
-      high[k] = x > high[k] ? x : high[k];
-    }
-  }
-  for (; i < count; ++i) {
-    low[0] = std::min(low[0], v[i]);
-    high[0] = std::max(high[0], v[i]);
-  }
-  return {*std::min_element(low.begin(), low.end()), *std::max_element(high.begin(), high.end())};
-}
-
 Box3d box_of(const PointBlock& block) {
   if (block.leaf != nullptr) {
     const Vec3d low = block.voxel_mm * Vec3d{static_cast<double>(block.leaf->x), static_cast<double>(block.leaf->y),
@@ -50,9 +27,9 @@ Box3d box_of(const PointBlock& block) {
     const double side = 7 * block.voxel_mm;
     return {low, low + Vec3d{side, side, side}};
   }
-  const Range x = range_of(block.x, block.count), y = range_of(block.y, block.count),
+  const Interval x = range_of(block.x, block.count), y = range_of(block.y, block.count),
               z = range_of(block.z, block.count);
-  return {{x.low, y.low, z.low}, {x.high, y.high, z.high}};
+  return {{x.lo, y.lo, z.lo}, {x.hi, y.hi, z.hi}};
 }
 
 /// min or max over any number of shapes. A member that cannot decide any value in the block is skipped.
@@ -186,6 +163,26 @@ Shape make(Args&&... args) {
 }
 
 }  // namespace
+
+/// Eight side by side, for the compiler.
+[[gnu::target_clones("avx2", "default")]] Interval range_of(const float* v, int count) {
+  std::array<float, 8> low, high;
+  low.fill(v[0]);
+  high.fill(v[0]);
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    for (std::size_t k = 0; k < 8; ++k) {
+      const float x = v[static_cast<std::size_t>(i) + k];
+      low[k] = x < low[k] ? x : low[k];
+      high[k] = x > high[k] ? x : high[k];
+    }
+  }
+  for (; i < count; ++i) {
+    low[0] = std::min(low[0], v[i]);
+    high[0] = std::max(high[0], v[i]);
+  }
+  return {*std::min_element(low.begin(), low.end()), *std::max_element(high.begin(), high.end())};
+}
 
 Interval Shape::Function::bound(const Box3d& box) const {
   const Vec3d c = box.center();

@@ -29,20 +29,6 @@ Vec3d sample_mm(const openvdb::Coord& ijk, double voxel) {
   return voxel * Vec3d{1.0 * ijk.x(), 1.0 * ijk.y(), 1.0 * ijk.z()};
 }
 
-/// Of a leaf's samples. Eight side by side, for the compiler.
-[[gnu::target_clones("avx2", "default")]] Interval range_of(const float* v) {
-  std::array<float, 8> lo, hi;
-  std::copy_n(v, lo.size(), lo.data());
-  hi = lo;
-  for (std::size_t i = 8; i < Leaf::SIZE; i += 8) {
-    for (std::size_t k = 0; k < 8; ++k) {
-      lo[k] = v[i + k] < lo[k] ? v[i + k] : lo[k];
-      hi[k] = v[i + k] > hi[k] ? v[i + k] : hi[k];
-    }
-  }
-  return {*std::min_element(lo.begin(), lo.end()), *std::max_element(hi.begin(), hi.end())};
-}
-
 struct SolidDistance final : Shape::Function {
   explicit SolidDistance(Solid s) : solid(std::move(s)) {}
 
@@ -86,7 +72,7 @@ struct SolidDistance final : Shape::Function {
         for (int z = first.z(); z <= samples.max().z(); z += 8) {
           const openvdb::Coord at(x, y, z);
           if (const Leaf* leaf = tree.probeConstLeaf(at)) {
-            const Interval all = range_of(leaf->buffer().data());
+            const Interval all = range_of(leaf->buffer().data(), Leaf::SIZE);
             take(all.lo, all.hi);
           } else {
             const float v = tree.getValue(at);

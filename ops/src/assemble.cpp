@@ -20,7 +20,7 @@ struct Assembly final : Shape::Function {
   void evaluate(const PointBlock& block, float* out) const override {
     body.evaluate(block, out);
     // Where b > -t/2 the shell's other face is farther than the outer one and nothing inside can change the value.
-    if (*std::min_element(out, out + block.count) > -0.5F * shell) return;
+    if (range_of(out, block.count).lo > -0.5F * shell) return;
     Values fill;
     inner.evaluate(block, fill.data());
     for (int k = 0; k < block.count; ++k) {
@@ -48,13 +48,13 @@ struct Clipped final : Shape::Function {
   void evaluate(const PointBlock& block, float* out) const override {
     Values region;
     filled.region.evaluate(block, region.data());
-    const auto [lo, hi] = std::minmax_element(region.begin(), region.begin() + block.count);
-    if (*lo - overlap > reach) {
+    const auto [lo, hi] = range_of(region.data(), block.count);
+    if (lo - overlap > reach) {
       for (int k = 0; k < block.count; ++k) out[k] = region[static_cast<std::size_t>(k)] - overlap;
       return;
     }
     filled.fill.evaluate(block, out);
-    if (*hi < -reach) return;  // deep inside the part: the clip is far below anything in the band
+    if (hi < -reach) return;  // deep inside the part: the clip is far below anything in the band
     for (int k = 0; k < block.count; ++k) out[k] = std::max(out[k], region[static_cast<std::size_t>(k)] - overlap);
   }
   [[nodiscard]] Interval bound(const Box3d& box) const override {

@@ -18,6 +18,8 @@ namespace fibrolite {
 struct Interval {
   float lo, hi;
 };
+/// The least and the greatest of some values, 1 or more.
+[[nodiscard]] Interval range_of(const float* values, int count);
 
 /// Up to 512 points, structure of arrays, world mm. If `leaf` is set the points are the 8x8x8 samples of the lattice
 /// voxel_mm * (leaf + (i, j, k)), k (z) fastest, as in OpenVDB's leaf.
