@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "fibrolite/blocks.h"
 #include "fibrolite/error.h"
+#include "leaf_bits.h"
 #include "vdb_access.h"
 
 namespace fibrolite {
@@ -19,6 +21,17 @@ namespace {
 
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
+
+/// Moves values off the surface by `nudge` and limits them to what the grid tells; `depth` gets how far off it they are.
+[[gnu::target_clones("avx2", "default")]] void keep_in_band(float* values, float* depth, float nudge, float deepest,
+                                                            float highest) {
+  for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+    const float v = values[i], off = v < 0 ? -nudge : nudge;
+    depth[i] = std::abs(v);
+    const float kept = depth[i] < nudge ? off : v, most = kept < -deepest ? -deepest : kept;
+    values[i] = highest < most ? highest : most;
+  }
+}
 
 /// What became of one 8x8x8 block.
 struct Outcome {
@@ -113,20 +126,16 @@ class Blocks {
     shape_.evaluate(PointBlock{x.data(), y.data(), z.data(), PointBlock::capacity, &leaf_origin, spec_.voxel_mm},
                     values.data());
 
-    const auto nudge = static_cast<float>(1e-3 * spec_.voxel_mm);
+    std::array<float, PointBlock::capacity> depth;
+    keep_in_band(values.data(), depth.data(), static_cast<float>(1e-3 * spec_.voxel_mm), deepest_, band_);
+    const LeafBits in_band = bits_below(depth.data(), band_), inside = bits_below(values.data(), 0);
+    if (in_band == LeafBits{}) {
+      if (inside == LeafBits{}) return {nullptr, false};
+      if (std::all_of(inside.begin(), inside.end(), [](std::uint64_t word) { return ~word == 0; })) return {nullptr, true};
+    }
     Leaf::NodeMaskType active;
-    bool any_inside = false;
-    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-      float v = values[i];
-      if (std::abs(v) < nudge) v = v < 0 ? -nudge : nudge;
-      if (std::abs(v) < band_) active.setOn(i);
-      any_inside |= v < 0;
-      values[i] = std::clamp(v, -deepest_, band_);
-    }
-    if (active.isOff()) {
-      const bool all_inside = *std::max_element(values.begin(), values.end()) < 0;
-      if (all_inside || !any_inside) return {nullptr, all_inside};
-    }
+    for (std::size_t n = 0; n < in_band.size(); ++n)
+      active.getWord<std::uint64_t>(static_cast<openvdb::Index>(n)) = in_band[n];
     auto leaf = std::make_unique<Leaf>(origin, band_, false);
     std::copy(values.begin(), values.end(), leaf->buffer().data());
     leaf->setValueMask(active);

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "band_check.h"
+#include "leaf_bits.h"
 #include "triangle_cells.h"
 #include "triangle_kernel.h"
 
@@ -47,6 +48,17 @@ CoordBBox cube(const Coord& origin, int size) { return CoordBBox::createCube(ori
 Coord cells_to_samples(int x, int y, int z) { return {x * cell_size, y * cell_size, z * cell_size}; }
 
 enum Side : int { Inside = -1, Crossed = 0, Outside = 1 };
+
+/// A leaf's values, in voxels and as they are stored.
+[[gnu::target_clones("avx2", "default")]] void keep_in_band(const float* values, float lowest, float highest,
+                                                            float voxel, float* kept, float* stored) {
+  for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+    const float some = values[i] < lowest ? lowest : values[i], v = highest < some ? highest : some;
+    const float off = std::copysign(nudge_vox, v);
+    kept[i] = std::abs(v) < rounding_vox ? off : v;
+    stored[i] = voxel * kept[i];
+  }
+}
 
 struct Tile {
   Coord origin;
@@ -465,19 +477,15 @@ class TriangleBand::Builder {
     const auto voxel = static_cast<float>(params_.voxel_mm);
     const float lowest = -params_.inside_vox, highest = params_.outside_vox;
     auto leaf = std::make_unique<Leaf>(origin, voxel * highest, false);
-    float* out = leaf->buffer().data();
+    float kept[Leaf::SIZE];
+    keep_in_band(values, lowest, highest, voxel, kept, leaf->buffer().data());
+    const LeafBits under = bits_below(kept, highest), lowest_or_less = bits_below(kept, std::nextafter(lowest, highest));
+    const bool negative = bits_below(kept, 0) != LeafBits{};
     openvdb::util::NodeMask<3> active;
-    bool any = false, negative = false;
-    for (openvdb::Index x = 0; x < 8; ++x) {
-      std::uint64_t word = 0;
-      for (openvdb::Index i = 0; i < 64; ++i) {
-        float v = std::clamp(values[x * 64 + i], lowest, highest);
-        if (std::abs(v) < rounding_vox) v = std::copysign(nudge_vox, v);
-        word |= std::uint64_t{v > lowest && v < highest} << i;
-        out[x * 64 + i] = voxel * v;
-        negative = negative || v < 0;
-      }
-      active.getWord<std::uint64_t>(x) = word;
+    bool any = false;
+    for (std::size_t x = 0; x < under.size(); ++x) {
+      const std::uint64_t word = under[x] & ~lowest_or_less[x];
+      active.getWord<std::uint64_t>(static_cast<openvdb::Index>(x)) = word;
       any = any || word != 0;
     }
     if (any) {
