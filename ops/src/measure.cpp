@@ -66,7 +66,27 @@ struct Lanes {
   }
 };
 
+/// Of a block that lies wholly in the lumen, as most do: the same sums as one_part()'s, in the same order.
+PartSums one_lumen(const Values& solid, const PointBlock& block, float inverse) {
+  constexpr double row = 8, slice = 64, all = 512;
+  Lanes infill;
+  if (below(range_of(solid.data(), PointBlock::capacity).lo, inverse) > 0) {
+    for (std::size_t k = 0; k < PointBlock::capacity; k += 8)
+      for (std::size_t z = 0; z < 8; ++z) infill.of[z] += below(solid[k + z], inverse);
+  }
+  Vec3d moment{};
+  for (std::size_t x = 0; x < 8; ++x) {
+    for (std::size_t y = 0; y < 8; ++y) moment.y += row * static_cast<double>(block.y[64 * x + 8 * y]);
+    for (std::size_t z = 0; z < 8; ++z) moment.z += 8.0 * static_cast<double>(block.z[z]);
+    moment.x += slice * static_cast<double>(block.x[64 * x]);
+  }
+  return {all, all, infill.total(), moment};
+}
+
 PartSums one_part(const Values& body, const Values& solid, const PointBlock& block, float inverse, float shell) {
+  const Interval range = range_of(body.data(), PointBlock::capacity);
+  if (below(range.lo, inverse) <= 0) return {};
+  if (below(range.hi + shell, inverse) >= 1) return one_lumen(solid, block, inverse);
   Lanes part, lumen, infill;
   Vec3d moment{};
   for (std::size_t x = 0; x < 8; ++x) {
