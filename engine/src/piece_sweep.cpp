@@ -210,7 +210,8 @@ struct PieceSweep::Impl {
   [[nodiscard]] Face face(const LeafLabels* labels, const std::vector<Id>& id, bool upper) const {
     Face result;
     for (std::size_t k = 0; k < id.size(); ++k) {
-      const std::uint64_t mine = labels != nullptr ? face_of(labels->sets[k].bits, params.axis, upper) : ~std::uint64_t{0};
+      const std::uint64_t mine =
+          labels != nullptr ? face_of(labels->sets[k].bits, params.axis, upper) : ~std::uint64_t{0};
       for (std::uint64_t rest = mine; rest != 0; rest &= rest - 1)
         result.id[static_cast<std::size_t>(std::countr_zero(rest))] = id[k];
       if (sets[id[k]].inside) result.inside |= mine;

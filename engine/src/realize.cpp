@@ -22,7 +22,8 @@ namespace {
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 
-/// Moves values off the surface by `nudge` and limits them to what the grid tells; `depth` gets how far off it they are.
+/// Moves values off the surface by `nudge` and limits them to what the grid tells; `depth` gets how far off it they
+/// are.
 [[gnu::target_clones("avx2", "default")]] void keep_in_band(float* values, float* depth, float nudge, float deepest,
                                                             float highest) {
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
@@ -131,7 +132,8 @@ class Blocks {
     const LeafBits in_band = bits_below(depth.data(), band_), inside = bits_below(values.data(), 0);
     if (in_band == LeafBits{}) {
       if (inside == LeafBits{}) return {nullptr, false};
-      if (std::all_of(inside.begin(), inside.end(), [](std::uint64_t word) { return ~word == 0; })) return {nullptr, true};
+      if (std::all_of(inside.begin(), inside.end(), [](std::uint64_t word) { return ~word == 0; }))
+        return {nullptr, true};
     }
     Leaf::NodeMaskType active;
     for (std::size_t n = 0; n < in_band.size(); ++n)

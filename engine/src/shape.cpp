@@ -28,7 +28,7 @@ Box3d box_of(const PointBlock& block) {
     return {low, low + Vec3d{side, side, side}};
   }
   const Interval x = range_of(block.x, block.count), y = range_of(block.y, block.count),
-              z = range_of(block.z, block.count);
+                 z = range_of(block.z, block.count);
   return {{x.lo, y.lo, z.lo}, {x.hi, y.hi, z.hi}};
 }
 

@@ -479,7 +479,8 @@ class TriangleBand::Builder {
     auto leaf = std::make_unique<Leaf>(origin, voxel * highest, false);
     float kept[Leaf::SIZE];
     keep_in_band(values, lowest, highest, voxel, kept, leaf->buffer().data());
-    const LeafBits under = bits_below(kept, highest), lowest_or_less = bits_below(kept, std::nextafter(lowest, highest));
+    const LeafBits under = bits_below(kept, highest),
+                   lowest_or_less = bits_below(kept, std::nextafter(lowest, highest));
     const bool negative = bits_below(kept, 0) != LeafBits{};
     openvdb::util::NodeMask<3> active;
     bool any = false;

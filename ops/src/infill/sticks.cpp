@@ -59,9 +59,7 @@ struct Crystal final : Lattice {
   };
   /// The two ways to the nearest even number without a call: the constant pushes the fraction out of the mantissa.
   static constexpr float push = 12582912.0F;  // 1.5 * 2^23
-  static float nearest_even(float v) {
-    return 2.0F * ((0.5F * v + push) - push);
-  }
+  static float nearest_even(float v) { return 2.0F * ((0.5F * v + push) - push); }
   static Folded fold(float x, float y, float z) {
     const float ex = nearest_even(x), ey = nearest_even(y), ez = nearest_even(z);
     const float rx = x - ex, ry = y - ey, rz = z - ez;
@@ -114,7 +112,8 @@ struct Crystal final : Lattice {
       const Mask flip = (x < 0) ^ (y < 0) ^ (z < 0) ^ odd;
       Lanes a = x < 0 ? -x : x, b = y < 0 ? -y : y, c = z < 0 ? -z : z;
       const Lanes bc = b < c ? c : b, largest = a < bc ? bc : a;
-      const Mask step_a = odd & (a == largest), step_b = odd & ~step_a & (b == largest), step_c = odd & ~step_a & ~step_b;
+      const Mask step_a = odd & (a == largest), step_b = odd & ~step_a & (b == largest),
+                 step_c = odd & ~step_a & ~step_b;
       a = step_a ? 2.0F - a : a;
       b = step_b ? 2.0F - b : b;
       c = step_c ? 2.0F - c : c;
