@@ -103,41 +103,52 @@ void KeepVolume::settle(std::size_t n) {
       u.edges += more.edges;
     }
     const float length = std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz), mean = 1 / std::max(u.edges, 1.0F);
-    u.x *= mean, u.y *= mean, u.z *= mean;
+    const float unit = length > 0 ? 1 / length : 0;
+    u.nx *= unit, u.ny *= unit, u.nz *= unit;
+    u.x = mean * (u.x * u.nx + u.y * u.ny + u.z * u.nz);
     u.flatness = u.flatness > 0 ? length / u.flatness : 0;
-    u.edges = 0;
+    u.flattest() = 0;
+    u.sharpest() = 1;
   }
   work.above = {};
 }
 
-/// The flattest vertex around each.
+/// The flattest and the sharpest vertex around each.
 void KeepVolume::look_around(std::size_t n) {
   Work& work = window_[n];
   const std::size_t first = work.layer.first;
   for (const Quad& q : work.layer.quads) {
     std::array<Umbrella*, 4> u;
-    float most = 0;
+    float most = 0, least = 1;
     for (std::size_t k = 0; k < 4; ++k) {
       u[k] = q[k] >= first ? &work.mine[q[k] - first] : &window_[n - 1].mine[q[k] - window_[n - 1].layer.first];
       most = std::max(most, u[k]->flatness);
+      least = std::min(least, u[k]->flatness);
     }
-    for (Umbrella* one : u) one->edges = std::max(one->edges, most);
+    for (Umbrella* one : u) {
+      one->flattest() = std::max(one->flattest(), most);
+      one->sharpest() = std::min(one->sharpest(), least);
+    }
   }
 }
 
 void KeepVolume::choose_moves(std::size_t n) {
   constexpr float sharp = 0.72F, smooth = 0.86F;  // flatness of a vertex: 1 on a face, cos 45 degrees on a box's edge
   constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
+  // Beside an edge there is a vertex on a face, and one on the edge, in whichever cells of the lattice that runs.
+  constexpr float blunt = 0.96F, round = 0.985F, nearly_plane = 0.998F, plane = 0.9995F;
   const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
   Work& work = window_[n];
   const double unit = static_cast<double>(move_unit(voxel_mm_)), most = 32767 * unit;
   work.layer.moves.resize(work.mine.size());
   for (std::size_t i = 0; i < work.mine.size(); ++i) {
-    const Umbrella& u = work.mine[i];
-    const Vec3d normal = normalized(Vec3d{u.nx, u.ny, u.nz});
-    const double along = dot(Vec3d{u.x, u.y, u.z}, normal);
-    const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.edges, bent, flat);
-    const Vec3d move = std::clamp((edge - 1) * along, -most, most) / unit * normal;
+    Umbrella& u = work.mine[i];
+    const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.flattest(), bent, flat);
+    // The edge of a box hangs lower than its face: pushed out for that, the face would get a ridge.
+    const float beside =
+        flat_faces_ ? (1 - ramp(u.sharpest(), blunt, round)) * ramp(u.flattest(), nearly_plane, plane) : 0;
+    const double by = std::clamp(static_cast<double>((std::max(edge, beside) - 1) * u.x), -most, most) / unit;
+    const Vec3d move = by * Vec3d{u.nx, u.ny, u.nz};
     for (std::size_t axis = 0; axis < 3; ++axis)
       work.layer.moves[i][axis] = static_cast<std::int16_t>(std::lround(move[static_cast<int>(axis)]));
   }

@@ -217,7 +217,7 @@ class Finisher {
 
 struct SurfaceLayers::Impl {
   Impl(Grid g, const SurfaceParams& p, const std::optional<std::filesystem::path>& scratch)
-      : grid(g), params(p), dual(g, p.axis), keep(g.voxel_mm, p.keep_volume), store(scratch) {}
+      : grid(g), params(p), dual(g, p.axis), keep(g.voxel_mm, p.keep_volume, p.flat_faces), store(scratch) {}
 
   void push(MovableLayer&& layer) { store.push(std::move(layer)); }
 

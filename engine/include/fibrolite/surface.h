@@ -17,6 +17,9 @@ struct SurfaceParams {
   /// Move each vertex so that curved surfaces keep their volume (a mesh with its vertices on a convex surface lies
   /// inside it).
   bool keep_volume = true;
+  /// But leave flat faces beside sharp edges where they are: what an edge lacks would be made good by a ridge of up to
+  /// a third of a voxel there. Where the mesh is but a coarse stand-in for a volume, that is better kept.
+  bool flat_faces = true;
   int axis = 2;  ///< Vertices and triangles come in layers of 8 voxels along it.
 };
 
