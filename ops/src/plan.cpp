@@ -163,8 +163,8 @@ Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, Inf
   const double voxels = body_times * body + solid_times * solid, mesh = solid + 20 * result.triangles;
   result.memory_bytes = fixed_bytes(model) + std::max({safety * voxels, safety * mesh, deciding_bytes(infill)});
   // Measured on one thread: of the body per sample; of the solid per voxel of the band; of the mesh per triangle.
-  const double deciding_s = infill == InfillKind::Hybrid ? 14 : 0, body_s = 46e-9 * body / bytes_a_sample;
-  const double solid_s = (recipe.print.check ? 145e-9 : 105e-9) * result.active_voxels;
+  const double deciding_s = infill == InfillKind::Hybrid ? 8 : 0, body_s = 46e-9 * body / bytes_a_sample;
+  const double solid_s = (recipe.print.check ? 120e-9 : 45e-9) * result.active_voxels;
   const double model_s = 0.2 + 5e-6 * static_cast<double>(model.triangles.size());
   result.cpu_s = model_s + deciding_s + body_s + solid_s + 245e-9 * result.triangles;
   result.slabs_s = model_s + body_s + 0.8 * solid_s;
@@ -172,7 +172,7 @@ Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, Inf
 }
 
 double machine_times() {
-  constexpr double there_s = 6.7e-6;  // a block
+  constexpr double there_s = 1.32e-6;  // a block
   const Shape sticks = crystal(sized(TcsParams{}));
   std::array<float, PointBlock::capacity> x, y, z, out;
   for (std::size_t i = 0; i < x.size(); ++i) {
