@@ -205,7 +205,8 @@ void add_generate_command(CLI::App& program) {
   add_options(command, options->recipe);
   add_pictures(command, options->pictures);
   add_file(command, "--steps", options->steps, ".vdb", "Every step as a named grid");
-  command.add_flag("--fix", options->fix, "Mend what the print checks find: thin walls, small gaps, closed voids");
+  command.add_flag("--fix", options->fix,
+                   "Mend what the print checks find: thin walls, small gaps, overhangs, closed voids");
   command.add_flag("--dry-run", options->run.dry_run, "Say what would be done, write nothing");
   add_options(command, options->run);
   command.callback([options] { generate(*options); });

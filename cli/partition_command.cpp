@@ -51,7 +51,7 @@ InterfaceReport interface_report(const Cut& cut) {
   interface.a = cut.a;
   interface.b = cut.b;
   interface.centroid_mm = cut.frame.origin;
-  interface.normal = cut.frame.z;
+  interface.normal = cut.surface().normal({});
   interface.bent = !cut.bend.flat();
   interface.area_mm2 = interface.layer_area_mm2 = interface.union_area_mm2 = interface.bridge_area_mm2 =
       interface.contact_area_mm2 = interface.mst_bridge_mm3 = interface.bbox_bridge_mm3 = not_measured;

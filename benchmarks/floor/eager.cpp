@@ -7,21 +7,13 @@
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
-#include <chrono>
-#include <ctime>
-
+#include "clocks.h"
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/recipe.h"
 #include "fibrolite/realize.h"
 #include "fibrolite/vdb.h"
 
 namespace fibrolite::bench {
-namespace {
-
-double wall_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-}  // namespace
 
 Eager eager_csg(const std::vector<openvdb::Vec3s>& points, const std::vector<openvdb::Vec3I>& triangles,
                 double voxel_mm) {

@@ -18,17 +18,16 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <exception>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
 
+#include "clocks.h"
 #include "eager.h"
 #include "fibrolite/mesh_io.h"
 #include "fibrolite/ops/prepare.h"
@@ -39,8 +38,8 @@
 
 namespace {
 
-double wall_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+using fibrolite::bench::cpu_s;
+using fibrolite::bench::wall_s;
 
 int compare_bands(const fibrolite::Mesh& mesh, double voxel_mm, const std::vector<openvdb::Vec3s>& points,
                   const std::vector<openvdb::Vec3I>& triangles) {

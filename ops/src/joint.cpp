@@ -19,16 +19,34 @@ namespace {
 
 constexpr double max_section_px = 2048;
 
-/// A section image made a slab: the layer's distance in the frame's plane, half the thickness to either side.
-class Slab final : public Shape::Function {
+/// A section image made a solid.
+class Extruded : public Shape::Function {
+ public:
+  /// Samples with a Lipschitz constant, plus what bilinear values can add at both ends (0.71 pixel each).
+  [[nodiscard]] Interval bound(const Box3d& box) const override {
+    const Vec3f c = to_float(box.center());
+    float value = 0;
+    evaluate({&c.x, &c.y, &c.z, 1}, &value);
+    const auto reach = static_cast<float>(lipschitz_ * (0.5 * norm(box.size()) + 1.5 * pixel_mm_));
+    return {value - reach, value + reach};
+  }
+  [[nodiscard]] double lipschitz() const override { return lipschitz_ * std::sqrt(2.0); }
+
+ protected:
+  /// `lipschitz`: of the values, if they were not interpolated.
+  Extruded(const Layer& layer, double lipschitz)
+      : image_(layer.distance_mm), corner_(layer.origin_mm), pixel_mm_(layer.pixel_mm), lipschitz_(lipschitz) {}
+
+  FloatImage image_;
+  Vec2d corner_;
+  double pixel_mm_, lipschitz_;
+};
+
+/// The layer's distance in the frame's plane, half the thickness to either side.
+class Slab final : public Extruded {
  public:
   Slab(const Layer& layer, const Frame& frame, double thickness_mm, double lipschitz)
-      : image_(layer.distance_mm),
-        frame_(frame),
-        corner_(layer.origin_mm),
-        pixel_mm_(layer.pixel_mm),
-        half_(static_cast<float>(thickness_mm / 2)),
-        lipschitz_(lipschitz) {}
+      : Extruded(layer, lipschitz), frame_(frame), half_(static_cast<float>(thickness_mm / 2)) {}
 
   void evaluate(const PointBlock& block, float* out) const override {
     const Vec3f o = to_float(frame_.origin), ux = to_float(frame_.x), uy = to_float(frame_.y), uz = to_float(frame_.z);
@@ -46,41 +64,26 @@ class Slab final : public Shape::Function {
       out[i] = std::max({height, bilinear(image_, px, py), beyond > 0 ? beyond : -far_mm});
     }
   }
-  /// Samples with a Lipschitz constant, plus what bilinear values can add at both ends (0.71 pixel each).
-  [[nodiscard]] Interval bound(const Box3d& box) const override {
-    const Vec3f c = to_float(box.center());
-    float value = 0;
-    evaluate({&c.x, &c.y, &c.z, 1}, &value);
-    const auto reach = static_cast<float>(lipschitz_ * (0.5 * norm(box.size()) + 1.5 * pixel_mm_));
-    return {value - reach, value + reach};
-  }
-  [[nodiscard]] double lipschitz() const override { return lipschitz_ * std::sqrt(2.0); }
 
  private:
-  FloatImage image_;
   Frame frame_;
-  Vec2d corner_;
-  double pixel_mm_;
   float half_;
-  double lipschitz_;
 };
 
-/// A section image on a bent plane made a layer: each point asks at its foot. The surface counts within a cylinder
+/// The same on a bent plane: each point asks at its foot. The surface counts within a cylinder
 /// about the frame's z axis; beyond it, and far above or below, distances are lower bounds.
-class BentSlab final : public Shape::Function {
+class BentSlab final : public Extruded {
  public:
   BentSlab(const Layer& layer, const BentPlane& surface, double thickness_mm, double lipschitz)
-      : image_(layer.distance_mm),
+      : Extruded(layer, lipschitz),
         surface_(surface),
-        corner_(layer.origin_mm),
-        pixel_mm_(layer.pixel_mm),
         radius_mm_(0.5 * (image_.width - 1) * pixel_mm_),
         half_mm_(thickness_mm / 2),
         steepest_(std::hypot(1, surface.bend.steepest(radius_mm_))),
         near_mm_(steepest_ * (half_mm_ + Layer::cap_px * pixel_mm_)) {
     // Feet draw near to each other towards the centre of curvature.
     constexpr double least_spread = 0.25;
-    lipschitz_ = lipschitz * steepest_ / std::max(1 - near_mm_ * surface.bend.curvature(), least_spread);
+    lipschitz_ *= steepest_ / std::max(1 - near_mm_ * surface.bend.curvature(), least_spread);
   }
 
   void evaluate(const PointBlock& block, float* out) const override {
@@ -99,24 +102,12 @@ class BentSlab final : public Shape::Function {
       out[i] = std::max(static_cast<float>(std::max(height, beyond)), layer);
     }
   }
-  /// As of a plane slab.
-  [[nodiscard]] Interval bound(const Box3d& box) const override {
-    const Vec3f c = to_float(box.center());
-    float value = 0;
-    evaluate({&c.x, &c.y, &c.z, 1}, &value);
-    const auto reach = static_cast<float>(lipschitz_ * (0.5 * norm(box.size()) + 1.5 * pixel_mm_));
-    return {value - reach, value + reach};
-  }
-  [[nodiscard]] double lipschitz() const override { return lipschitz_ * std::sqrt(2.0); }
 
  private:
-  FloatImage image_;
   BentPlane surface_;
-  Vec2d corner_;
-  double pixel_mm_, radius_mm_, half_mm_;
+  double radius_mm_, half_mm_;
   double steepest_;  // of an upward path on it, over that of the plane below
   double near_mm_;   // so far along z, feet are looked for
-  double lipschitz_ = 1;
 };
 
 void check(const JointParams& p) {

@@ -376,11 +376,18 @@ void cross_cuts(Partition& partition, const Core& core) {
   for (std::size_t c = 0; c < before; ++c) {
     Cut cut = partition.cuts[c];
     if (cut.a != core.host && cut.b != core.host) continue;
-    const double slope = dot(cut.frame.z, core.frame.z);
-    if (std::abs(slope) < 1e-6) continue;
-    const double t = dot(cut.frame.z, cut.frame.origin - core.frame.origin) / slope;
+    const Vec3d way = cut.frame.origin - core.frame.origin;
+    double t = std::clamp(dot(way, core.frame.z), 0.0, core.length_mm), reach_mm = cut.radius_mm;
+    if (cut.bend.flat()) {
+      const double slope = dot(cut.frame.z, core.frame.z);
+      if (std::abs(slope) < 1e-6) continue;
+      t = dot(cut.frame.z, way) / slope;
+    } else {
+      // A bowl may be met beside its plane: whatever comes near it, for where nothing meets there is no section.
+      reach_mm *= std::hypot(1, cut.bend.steepest(cut.radius_mm));
+    }
     const Vec3d at = core.frame.origin + t * core.frame.z;
-    if (t < 0 || t > core.length_mm || norm(at - cut.frame.origin) > cut.radius_mm + core.radius_mm) continue;
+    if (t < 0 || t > core.length_mm || norm(at - cut.frame.origin) > reach_mm + core.radius_mm) continue;
     (cut.a == core.host ? cut.a : cut.b) = core.id;
     partition.cuts.push_back(cut);
   }

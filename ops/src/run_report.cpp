@@ -79,7 +79,7 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
     row.centroid_mm = interfaces[i].frame.to_world({0, 0, 0.5 * interfaces[i].length_mm});
     row.radius_mm = interfaces[i].length_mm > 0 ? interfaces[i].radius_mm : 0;
     row.bent = !interfaces[i].bend.flat();
-    row.normal = interfaces[i].frame.z;
+    row.normal = interfaces[i].surface().normal({});
     row.area_mm2 = interfaces[i].area_mm2;
     row.regions_before = joint.layer.regions_before;
     row.regions_after = joint.layer.regions_after;

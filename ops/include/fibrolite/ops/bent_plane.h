@@ -33,8 +33,8 @@ struct Bend {
   friend constexpr bool operator==(const Bend&, const Bend&) = default;
 };
 
-/// The points z = bend.height({x, y}) of a frame; its normals point to where z is larger. A flat one is the frame's xy
-/// plane, to the last bit.
+/// The points z = bend.height({x, y}) of a frame, mm; its normals point to where z is larger. A flat one is the frame's
+/// xy plane, to the last bit. Source: ours.
 struct BentPlane {
   Frame frame;
   Bend bend{};

@@ -30,7 +30,7 @@ struct PartReport {
 };
 struct InterfaceReport {
   int a = 0, b = 0;
-  Vec3d centroid_mm{}, normal{};  ///< Of a mantle: its axis.
+  Vec3d centroid_mm{}, normal{};  ///< Of a mantle: its axis; of a bent border: in its middle.
   double radius_mm = 0;           ///< Of the mantle of a core; else 0.
   bool bent = false;              ///< No plane, and no mantle.
   double area_mm2 = 0;
