@@ -48,10 +48,10 @@ void KeepVolume::process(bool all, const Use& use) {
   } else {
     summed_ = settled_ = looked_ = moved_ = count;
   }
-  std::vector<std::array<double, 4>> volumes(moved_ - measured_);
+  std::vector<std::array<double, steps.size()>> volumes(moved_ - measured_);
   tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t i) { volumes[i] = volume_of(measured_ + i); });
   for (const auto& v : volumes)
-    for (std::size_t k = 0; k < 4; ++k) volume_[k] += v[k];
+    for (std::size_t k = 0; k < v.size(); ++k) volume_[k] += v[k];
   measured_ = moved_;
 
   const std::size_t done = but(measured_, 1);  // the last is looked at from above
@@ -141,60 +141,67 @@ void KeepVolume::choose_moves(std::size_t n) {
   Work& work = window_[n];
   const double unit = static_cast<double>(move_unit(voxel_mm_)), most = 32767 * unit;
   work.layer.moves.resize(work.mine.size());
+  const std::vector<Vec3s>& points = work.layer.points;
+  const auto shares_cell = [&](std::size_t i) {
+    return (i > 0 && mover_.together(points[i - 1], points[i])) ||
+           (i + 1 < points.size() && mover_.together(points[i], points[i + 1]));
+  };
   for (std::size_t i = 0; i < work.mine.size(); ++i) {
     Umbrella& u = work.mine[i];
     const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.flattest(), bent, flat);
     // The edge of a box hangs lower than its face: pushed out for that, the face would get a ridge.
     const float beside =
-        flat_faces_ ? (1 - ramp(u.sharpest(), blunt, round)) * ramp(u.flattest(), nearly_plane, plane) : 0;
+        !mover_.free() ? (1 - ramp(u.sharpest(), blunt, round)) * ramp(u.flattest(), nearly_plane, plane) : 0;
     const double by = std::clamp(static_cast<double>((std::max(edge, beside) - 1) * u.x), -most, most) / unit;
     const Vec3d move = by * Vec3d{u.nx, u.ny, u.nz};
+    if (!mover_.free() && shares_cell(i)) continue;
     for (std::size_t axis = 0; axis < 3; ++axis)
       work.layer.moves[i][axis] = static_cast<std::int16_t>(std::lround(move[static_cast<int>(axis)]));
+  }
+  for (std::size_t s = 1; s < steps.size(); ++s) {
+    work.moved[s].resize(work.mine.size());
+    for (std::size_t i = 0; i < work.mine.size(); ++i)
+      work.moved[s][i] = mover_(points[i], work.layer.moves[i], steps[s]);
   }
   work.mine = {};
 }
 
 /// What the quads add to the volume, each along its diagonal that is shorter after a whole move.
-std::array<double, 4> KeepVolume::volume_of(std::size_t n) const {
-  const MovableLayer& layer = window_[n].layer;
-  const MovableLayer* below = n > 0 ? &window_[n - 1].layer : nullptr;
-  const auto unit = static_cast<double>(move_unit(voxel_mm_));
-  std::array<double, 4> sum{};
-  for (const Quad& q : layer.quads) {
-    std::array<Vec3d, 4> p, m{};
-    for (std::size_t k = 0; k < 4; ++k) {
-      const MovableLayer& of = q[k] >= layer.first ? layer : *below;
-      p[k] = to_vec(of.points[q[k] - of.first]);
-      if (!moving_) continue;
-      const MovableLayer::Move& move = of.moves[q[k] - of.first];
-      m[k] = unit * Vec3d{1.0 * move[0], 1.0 * move[1], 1.0 * move[2]};
-    }
-    const Vec3d first = p[2] + m[2] - p[0] - m[0], second = p[3] + m[3] - p[1] - m[1];
+std::array<double, KeepVolume::steps.size()> KeepVolume::volume_of(std::size_t n) const {
+  const Work& work = window_[n];
+  const Work* below = n > 0 ? &window_[n - 1] : nullptr;
+  const auto at = [&](std::uint32_t v, std::size_t step) -> const Vec3s& {
+    const Work& of = v >= work.layer.first ? work : *below;
+    return (of.moved[step].empty() ? of.layer.points : of.moved[step])[v - of.layer.first];
+  };
+  std::array<double, steps.size()> sum{};
+  for (const Quad& q : work.layer.quads) {
+    const Vec3d first = to_vec(at(q[2], 1)) - to_vec(at(q[0], 1)), second = to_vec(at(q[3], 1)) - to_vec(at(q[1], 1));
     const std::size_t a = dot(first, first) <= dot(second, second) ? 0 : 1;
     const std::size_t b = (a + 1) & 3, c = (a + 2) & 3, d = (a + 3) & 3;
-    // Both triangles: a . (c x (d - b)), each corner p + step m.
-    const Vec3d across = p[d] - p[b];
-    const Vec3d x0 = cross(p[c], across);
-    sum[0] += dot(p[a], x0);
-    if (!moving_) continue;
-    const Vec3d across_more = m[d] - m[b];
-    const Vec3d x1 = cross(m[c], across) + cross(p[c], across_more), x2 = cross(m[c], across_more);
-    sum[1] += dot(m[a], x0) + dot(p[a], x1);
-    sum[2] += dot(m[a], x1) + dot(p[a], x2);
-    sum[3] += dot(m[a], x2);
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+      // Both triangles.
+      sum[s] += dot(to_vec(at(q[a], s)), cross(to_vec(at(q[c], s)), to_vec(at(q[d], s)) - to_vec(at(q[b], s))));
+    }
   }
   return sum;
 }
 
 double KeepVolume::step(double wanted_mm3) const {
-  const auto missing = [&](double s) {
-    return volume_[0] + s * (volume_[1] + s * (volume_[2] + s * volume_[3])) - 6 * wanted_mm3;
+  const auto missing = [&](double s) {  // through all that was measured
+    double sum = -6 * wanted_mm3;
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      double weight = 1;
+      for (const float other : steps)
+        if (other != steps[i]) weight *= (s - static_cast<double>(other)) / static_cast<double>(steps[i] - other);
+      sum += weight * volume_[i];
+    }
+    return sum;
   };
   // Nearly always the move is right as it is; where hardly anything moves, a volume that is right too asks for nothing.
   constexpr double close_enough = 1e-3;
   if (std::abs(missing(1)) <= 6 * close_enough * std::abs(wanted_mm3)) return 1;
-  double low = 0, high = 2;
+  double low = 0, high = static_cast<double>(steps.back());
   if ((missing(low) < 0) == (missing(high) < 0)) {
     // A field that is no distance may hold a volume that no such move can reach.
     double best = 1;

@@ -2,7 +2,9 @@
 // Where the vertices of a dual surface go so that it holds the volume of its solid.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -20,19 +22,53 @@ struct MovableLayer : QuadLayer {
 /// A 32767th of the longest move, 0.35 voxels: mm.
 [[nodiscard]] constexpr float move_unit(double voxel_mm) { return static_cast<float>(0.35 * voxel_mm / 32767); }
 
+/// Where a move takes a point: free, or so that it keeps two fifths of its distance to each plane of the
+/// lattice. Then it stays in its cell and apart from what lies around the lattice's points and edges, and no triangles
+/// cut each other.
+class Mover {
+ public:
+  Mover(double voxel_mm, bool free)
+      : voxel_(static_cast<float>(voxel_mm)),
+        per_voxel_(1 / voxel_),
+        unit_(move_unit(voxel_mm)),
+        more_(free ? 2 * voxel_ : 0) {}
+  [[nodiscard]] openvdb::Vec3s operator()(const openvdb::Vec3s& point, const MovableLayer::Move& move,
+                                          float step) const {
+    const openvdb::Vec3s low = corner(point);
+    openvdb::Vec3s to;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float p = point[axis], by = step * unit_ * static_cast<float>(move[static_cast<std::size_t>(axis)]);
+      const float down = 0.6F * (low[axis] - p) - more_, up = 0.6F * (low[axis] + voxel_ - p) + more_;
+      to[axis] = p + std::min(std::max(by, down), up);
+    }
+    return to;
+  }
+  /// Are both in one cell?
+  [[nodiscard]] bool together(const openvdb::Vec3s& a, const openvdb::Vec3s& b) const { return corner(a) == corner(b); }
+  [[nodiscard]] bool free() const { return more_ > 0; }
+
+ private:
+  [[nodiscard]] openvdb::Vec3s corner(const openvdb::Vec3s& p) const {
+    return voxel_ * openvdb::Vec3s(std::floor(p.x() * per_voxel_), std::floor(p.y() * per_voxel_),
+                                   std::floor(p.z() * per_voxel_));
+  }
+  float voxel_, per_voxel_, unit_, more_;  // longer than any move, if free
+};
+
 /// A mesh with its vertices on (or, as those of a dual surface, averaged below) a convex surface lies inside it and
 /// loses volume. To second order the loss is made good by moving each vertex along its normal by the normal part of its
 /// umbrella vector, mirrored; how far exactly, for all alike, is then set by the volume wanted. Flat faces, sharp
-/// edges and, if asked for, what lies beside one stay where they are: an edge is a bend beside something flat; a stick
-/// as thin as two voxels bends as much but has nothing flat around it.
+/// edges and, but in a stand-in, what lies beside one stay where they are: an edge is a bend beside something flat; a
+/// stick as thin as two voxels bends as much but has nothing flat around it. Vertices that share a cell stay too, for
+/// they might pass each other.
 ///
 /// Works on a few layers at a time: what a vertex does depends on the quads of its own layer, the one below and the two
 /// above.
 class KeepVolume {
  public:
   using Use = std::function<void(MovableLayer&&)>;
-  KeepVolume(double voxel_mm, bool moving, bool flat_faces)
-      : voxel_mm_(voxel_mm), moving_(moving), flat_faces_(flat_faces) {}
+  KeepVolume(double voxel_mm, bool moving, bool stand_in)
+      : voxel_mm_(voxel_mm), moving_(moving), mover_(voxel_mm, stand_in) {}
   /// The next layer; those that are done are handed on, in order. The same bits on any number of threads.
   void add(QuadLayer&& layer, const Use& use);
   /// No more layers come.
@@ -41,6 +77,7 @@ class KeepVolume {
   [[nodiscard]] double step(double wanted_mm3) const;
 
  private:
+  static constexpr std::array<float, 4> steps{0, 1, 1.5F, 2};  // at which the volume is measured
   struct Umbrella {
     float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours; later x: their mean, along the normal
     float nx = 0, ny = 0, nz = 0;  // sum of quad normals; later of length 1
@@ -53,20 +90,22 @@ class KeepVolume {
   struct Work {
     MovableLayer layer;
     std::vector<Umbrella> mine, above;  // from quads of this layer, and of the next
+    std::array<std::vector<openvdb::Vec3s>, steps.size()> moved;
   };
   void process(bool all, const Use& use);
   void sum_around(std::size_t n);
   void settle(std::size_t n);
   void look_around(std::size_t n);
   void choose_moves(std::size_t n);
-  [[nodiscard]] std::array<double, 4> volume_of(std::size_t n) const;
+  [[nodiscard]] std::array<double, steps.size()> volume_of(std::size_t n) const;
 
   double voxel_mm_;
-  bool moving_, flat_faces_;
+  bool moving_;
+  Mover mover_;
   std::deque<Work> window_;  // the first is done already, unless it is the very first
   // How many of the window have had their quads summed, their normals settled, ...
   std::size_t summed_ = 0, settled_ = 0, looked_ = 0, moved_ = 0, measured_ = 0;
-  std::array<double, 4> volume_{};  // six times it, by powers of the step
+  std::array<double, steps.size()> volume_{};  // six times it, at each of the steps
 };
 
 }  // namespace fibrolite

@@ -108,28 +108,21 @@ struct FinishedLayer {
 class Finisher {
  public:
   using Use = std::function<void(FinishedLayer&)>;  ///< Which may swap it for another, to be written over.
-  Finisher(double step, double voxel_mm, Use use)
-      : step_(static_cast<float>(step) * move_unit(voxel_mm)),
-        whole_step_(move_unit(voxel_mm)),
-        voxel_mm_(voxel_mm),
-        use_(std::move(use)) {}
+  Finisher(double step, double voxel_mm, bool stand_in, Use use)
+      : step_(static_cast<float>(step)), mover_(voxel_mm, stand_in), voxel_mm_(voxel_mm), use_(std::move(use)) {}
 
   void add(const MovableLayer& layer) {
     const std::size_t from = points_.size();
     if (from == 0) first_ = layer.first;
     const auto moved = [&](std::size_t i, float step) {
-      openvdb::Vec3s p = layer.points[i];
-      if (!layer.moves.empty()) {
-        const MovableLayer::Move& move = layer.moves[i];
-        p += step * openvdb::Vec3s(move[0], move[1], move[2]);
-      }
+      const openvdb::Vec3s p = layer.moves.empty() ? layer.points[i] : mover_(layer.points[i], layer.moves[i], step);
       return Vec3f{p.x(), p.y(), p.z()};
     };
     points_.resize(from + layer.points.size());
     each_chunk(layer.points.size(), [&](std::size_t i) { points_[from + i] = moved(i, step_); });
-    if (step_ != whole_step_) {
+    if (step_ != 1) {
       whole_.resize(points_.size());
-      each_chunk(layer.points.size(), [&](std::size_t i) { whole_[from + i] = moved(i, whole_step_); });
+      each_chunk(layer.points.size(), [&](std::size_t i) { whole_[from + i] = moved(i, 1); });
     }
     shake_degenerate(layer.quads);
     hand_on();
@@ -202,7 +195,8 @@ class Finisher {
     first_ += before_;
   }
 
-  float step_, whole_step_;  // mm for each unit of a move
+  float step_;
+  const Mover mover_;
   double voxel_mm_;
   const Use use_;
   // Of the layer below the one that waits, that one, and for a moment the next.
@@ -217,7 +211,7 @@ class Finisher {
 
 struct SurfaceLayers::Impl {
   Impl(Grid g, const SurfaceParams& p, const std::optional<std::filesystem::path>& scratch)
-      : grid(g), params(p), dual(g, p.axis), keep(g.voxel_mm, p.keep_volume, p.flat_faces), store(scratch) {}
+      : grid(g), params(p), dual(g, p.axis), keep(g.voxel_mm, p.keep_volume, p.stand_in), store(scratch) {}
 
   void push(MovableLayer&& layer) { store.push(std::move(layer)); }
 
@@ -272,7 +266,7 @@ void SurfaceLayers::each(const std::function<void(const MeshLayer&)>& use, const
   // The next layer is made while this one is used.
   FinishedLayer held;
   tbb::task_group behind;
-  Finisher finisher(impl_->step, impl_->grid.voxel_mm, [&](FinishedLayer& layer) {
+  Finisher finisher(impl_->step, impl_->grid.voxel_mm, impl_->params.stand_in, [&](FinishedLayer& layer) {
     behind.wait();
     std::swap(held, layer);
     behind.run([&] { use({held.vertices, held.first, held.before, held.triangles, {}}); });

@@ -171,8 +171,8 @@ TetMesh extract(const Proxy& proxy, const Shape& region, const ExtractParams& pa
     const double voxel = attempt.voxel * wanted_voxel;
     const Solid solid = realize(shape, proxy.solid.bounds_mm().grown(4 * voxel), Grid{.voxel_mm = voxel},
                                 context.part(0, 0.2, "extract"));
-    Mesh piece = main_piece(surface(solid, {.flat_faces = false}, context.part(0.2, 0.3, "extract")),
-                            27 * voxel * voxel * voxel);
+    Mesh piece =
+        main_piece(surface(solid, {.stand_in = true}, context.part(0.2, 0.3, "extract")), 27 * voxel * voxel * voxel);
     try {
       if (attempt.distance > 0) {
         piece = simplified(piece, solid, params.max_surface_triangles,

@@ -65,7 +65,7 @@ Proxy make_proxy(const Mesh& world, const ProxyParams& params, const Context& co
       proxy.solid = {};
     }
     if (!proxy.solid.empty() && (last || unreached(model, proxy.solid) <= unreached_allowed)) {
-      proxy.surface = surface(proxy.solid, {.flat_faces = false}, context.part(0.8, 1.0, "proxy"));
+      proxy.surface = surface(proxy.solid, {.stand_in = true}, context.part(0.8, 1.0, "proxy"));
       if (proxy.surface.triangles.empty()) break;
       context.progress(1);
       return proxy;

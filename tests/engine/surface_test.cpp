@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "dual_surface.h"
+#include "fibrolite/ops/inspect.h"
 #include "fibrolite/random.h"
 #include "fibrolite/realize.h"
 #include "mesh_checks.h"
@@ -175,6 +176,21 @@ TEST(SurfaceLayers, check_finds_what_is_wrong_in_any_layers) {
     const MeshCheck by_layers = check(faulty);
     EXPECT_EQ(counts(by_layers), counts(check(gathered(faulty)))) << fault;
     EXPECT_NE(counts(by_layers), counts(check(layers))) << fault;
+  }
+}
+
+/// Sticks that end in a wall whose face is a plane of the lattice, and cells of every kind.
+TEST(Surface, does_not_cut_itself) {
+  std::vector<Shape> parts{complement(cuboid({{-5, -5, -5}, {5, 5, 5}}))};
+  Random random(3, "sticks");
+  const auto anywhere = [&] { return Vec3d{random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5}; };
+  for (int i = 0; i < 60; ++i) parts.push_back(capsule(24 * anywhere(), 24 * anywhere(), 0.5));
+  const Shape sticks = intersect({unite(parts), cuboid({{-6, -6, -6}, {6, 6, 6}})});
+  const Shape noise = intersect({Shape(std::make_shared<const Noise>()), sphere({0, 0, 0}, 4)});
+  for (const Shape& shape : {sticks, noise}) {
+    const Mesh mesh = surface(realize(shape, box, {.voxel_mm = 0.125}));
+    ASSERT_GT(mesh.triangles.size(), 100000U);
+    EXPECT_EQ(inspect(mesh).self_intersections, 0);
   }
 }
 
