@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keep_volume.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 namespace fibrolite {
@@ -15,7 +18,20 @@ using openvdb::Vec3s;
 /// Layers that are worked on at once, for the threads to share.
 constexpr std::size_t batch = 4;
 
+using Range = tbb::blocked_range<std::size_t>;
+
 Vec3d to_vec(const Vec3s& v) { return {v.x(), v.y(), v.z()}; }
+
+/// The corner where a quad's shorter diagonal begins.
+std::size_t shorter(const std::array<Vec3d, 4>& p) {
+  const Vec3d first = p[2] - p[0], second = p[3] - p[1];
+  return dot(first, first) <= dot(second, second) ? 0 : 1;
+}
+
+/// Of the quad's two triangles, with the origin.
+double six_volumes_of(const std::array<Vec3d, 4>& p, std::size_t diagonal) {
+  return dot(p[diagonal], cross(p[diagonal + 2], p[(diagonal + 3) & 3] - p[diagonal + 1]));
+}
 
 }  // namespace
 
@@ -48,10 +64,9 @@ void KeepVolume::process(bool all, const Use& use) {
   } else {
     summed_ = settled_ = looked_ = moved_ = count;
   }
-  std::vector<std::array<double, steps.size()>> volumes(moved_ - measured_);
+  std::vector<double> volumes(moved_ - measured_);
   tbb::parallel_for(std::size_t{0}, volumes.size(), [&](std::size_t i) { volumes[i] = volume_of(measured_ + i); });
-  for (const auto& v : volumes)
-    for (std::size_t k = 0; k < v.size(); ++k) volume_[k] += v[k];
+  for (const double v : volumes) six_volumes_ += v;
   measured_ = moved_;
 
   const std::size_t done = but(measured_, 1);  // the last is looked at from above
@@ -137,71 +152,103 @@ void KeepVolume::choose_moves(std::size_t n) {
   constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
   // Beside an edge there is a vertex on a face, and one on the edge, in whichever cells of the lattice that runs.
   constexpr float blunt = 0.96F, round = 0.985F, nearly_plane = 0.998F, plane = 0.9995F;
-  const auto ramp = [](float x, float from, float to) { return std::clamp((x - from) / (to - from), 0.0F, 1.0F); };
-  Work& work = window_[n];
-  const double unit = static_cast<double>(move_unit(voxel_mm_)), most = 32767 * unit;
-  work.layer.moves.resize(work.mine.size());
-  const std::vector<Vec3s>& points = work.layer.points;
-  const auto shares_cell = [&](std::size_t i) {
-    return (i > 0 && mover_.together(points[i - 1], points[i])) ||
-           (i + 1 < points.size() && mover_.together(points[i], points[i + 1]));
+  const auto ramp = [](float x, float from, float to) {
+    return std::min(std::max((x - from) / (to - from), 0.0F), 1.0F);
   };
-  for (std::size_t i = 0; i < work.mine.size(); ++i) {
+  const auto rounded = [](float x) { return static_cast<std::int16_t>(x + (x < 0 ? -0.5F : 0.5F)); };
+  Work& work = window_[n];
+  const float per_unit = 1 / move_unit(voxel_mm_);
+  const std::size_t count = work.mine.size();
+  const std::vector<Vec3s>& points = work.layer.points;
+  work.layer.moves.resize(count);
+  work.moved.resize(count);
+  Vec3s cell, next = count > 0 ? mover_.cell(points[0]) : Vec3s(0);
+  bool with_last = false;
+  for (std::size_t i = 0; i < count; ++i) {
     Umbrella& u = work.mine[i];
+    cell = next;
+    if (i + 1 < count) next = mover_.cell(points[i + 1]);
+    const bool with_next = i + 1 < count && next == cell, stays = !mover_.free() && (with_last || with_next);
+    with_last = with_next;
     const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.flattest(), bent, flat);
     // The edge of a box hangs lower than its face: pushed out for that, the face would get a ridge.
     const float beside =
-        !mover_.free() ? (1 - ramp(u.sharpest(), blunt, round)) * ramp(u.flattest(), nearly_plane, plane) : 0;
-    const double by = std::clamp(static_cast<double>((std::max(edge, beside) - 1) * u.x), -most, most) / unit;
-    const Vec3d move = by * Vec3d{u.nx, u.ny, u.nz};
-    if (!mover_.free() && shares_cell(i)) continue;
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      work.layer.moves[i][axis] = static_cast<std::int16_t>(std::lround(move[static_cast<int>(axis)]));
-  }
-  for (std::size_t s = 1; s < steps.size(); ++s) {
-    work.moved[s].resize(work.mine.size());
-    for (std::size_t i = 0; i < work.mine.size(); ++i)
-      work.moved[s][i] = mover_(points[i], work.layer.moves[i], steps[s]);
+        mover_.free() ? 0 : (1 - ramp(u.sharpest(), blunt, round)) * ramp(u.flattest(), nearly_plane, plane);
+    const float by = std::min(std::max((std::max(edge, beside) - 1) * u.x * per_unit, -32767.0F), 32767.0F);
+    MovableLayer::Move& move = work.layer.moves[i];
+    if (!stays) move = {rounded(by * u.nx), rounded(by * u.ny), rounded(by * u.nz)};
+    work.moved[i] = mover_(points[i], cell, move, 1);
   }
   work.mine = {};
 }
 
-/// What the quads add to the volume, each along its diagonal that is shorter after a whole move.
-std::array<double, KeepVolume::steps.size()> KeepVolume::volume_of(std::size_t n) const {
+/// What the quads add to six times the volume, each along its diagonal that is shorter after a whole move.
+double KeepVolume::volume_of(std::size_t n) const {
   const Work& work = window_[n];
   const Work* below = n > 0 ? &window_[n - 1] : nullptr;
-  const auto at = [&](std::uint32_t v, std::size_t step) -> const Vec3s& {
+  const auto at = [&](std::uint32_t v) {
     const Work& of = v >= work.layer.first ? work : *below;
-    return (of.moved[step].empty() ? of.layer.points : of.moved[step])[v - of.layer.first];
+    return to_vec((moving_ ? of.moved : of.layer.points)[v - of.layer.first]);
   };
-  std::array<double, steps.size()> sum{};
+  double sum = 0;
   for (const Quad& q : work.layer.quads) {
-    const Vec3d first = to_vec(at(q[2], 1)) - to_vec(at(q[0], 1)), second = to_vec(at(q[3], 1)) - to_vec(at(q[1], 1));
-    const std::size_t a = dot(first, first) <= dot(second, second) ? 0 : 1;
-    const std::size_t b = (a + 1) & 3, c = (a + 2) & 3, d = (a + 3) & 3;
-    for (std::size_t s = 0; s < steps.size(); ++s) {
-      // Both triangles.
-      sum[s] += dot(to_vec(at(q[a], s)), cross(to_vec(at(q[c], s)), to_vec(at(q[d], s)) - to_vec(at(q[b], s))));
-    }
+    const std::array<Vec3d, 4> p{at(q[0]), at(q[1]), at(q[2]), at(q[3])};
+    sum += six_volumes_of(p, shorter(p));
   }
   return sum;
 }
 
-double KeepVolume::step(double wanted_mm3) const {
-  const auto missing = [&](double s) {  // through all that was measured
+double step_for_volume(double wanted_mm3, double six_volumes, const Mover& mover, std::size_t layers,
+                       const std::function<const MovableLayer&(std::size_t, MovableLayer&)>& layer) {
+  // Nearly always the move is right as it is; where hardly anything moves, a volume that is right too asks for nothing.
+  constexpr double close_enough = 1e-3;
+  if (std::abs(six_volumes - 6 * wanted_mm3) <= 6 * close_enough * std::abs(wanted_mm3)) return 1;
+  constexpr std::array<float, 4> steps{0, 1, 1.5F, 2};
+  std::array<double, steps.size()> volume{0, six_volumes, 0, 0};
+  using Places = std::array<std::vector<Vec3s>, steps.size()>;
+  Places places, before;
+  MovableLayer room;
+  for (std::size_t n = 0; n < layers; ++n) {
+    const MovableLayer& mine = layer(n, room);
+    const std::size_t below = mine.first - before[0].size();
+    for (std::size_t s = 0; s < steps.size(); ++s) {
+      places[s].resize(mine.points.size());
+      tbb::parallel_for(Range(0, mine.points.size(), 4096), [&](const Range& some) {
+        for (std::size_t i = some.begin(); i < some.end(); ++i) {
+          const Vec3s& p = mine.points[i];
+          places[s][i] = mine.moves.empty() ? p : mover(p, mover.cell(p), mine.moves[i], steps[s]);
+        }
+      });
+    }
+    const auto corners = [&](const Quad& q, std::size_t s) {
+      std::array<Vec3d, 4> p;
+      for (std::size_t k = 0; k < 4; ++k)
+        p[k] = to_vec(q[k] >= mine.first ? places[s][q[k] - mine.first] : before[s][q[k] - below]);
+      return p;
+    };
+    for (const std::size_t s : {0U, 2U, 3U}) {
+      volume[s] += tbb::parallel_deterministic_reduce(
+          Range(0, mine.quads.size(), 4096), 0.0,
+          [&](const Range& some, double sum) {
+            for (std::size_t i = some.begin(); i < some.end(); ++i)
+              sum += six_volumes_of(corners(mine.quads[i], s), shorter(corners(mine.quads[i], 1)));
+            return sum;
+          },
+          std::plus<>{});
+    }
+    std::swap(places, before);
+  }
+  const auto missing = [&](double s) {  // on the cubic through all four
     double sum = -6 * wanted_mm3;
     for (std::size_t i = 0; i < steps.size(); ++i) {
       double weight = 1;
       for (const float other : steps)
         if (other != steps[i]) weight *= (s - static_cast<double>(other)) / static_cast<double>(steps[i] - other);
-      sum += weight * volume_[i];
+      sum += weight * volume[i];
     }
     return sum;
   };
-  // Nearly always the move is right as it is; where hardly anything moves, a volume that is right too asks for nothing.
-  constexpr double close_enough = 1e-3;
-  if (std::abs(missing(1)) <= 6 * close_enough * std::abs(wanted_mm3)) return 1;
-  double low = 0, high = static_cast<double>(steps.back());
+  double low = 0, high = 2;
   if ((missing(low) < 0) == (missing(high) < 0)) {
     // A field that is no distance may hold a volume that no such move can reach.
     double best = 1;

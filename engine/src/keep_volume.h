@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -32,32 +31,34 @@ class Mover {
         per_voxel_(1 / voxel_),
         unit_(move_unit(voxel_mm)),
         more_(free ? 2 * voxel_ : 0) {}
-  [[nodiscard]] openvdb::Vec3s operator()(const openvdb::Vec3s& point, const MovableLayer::Move& move,
-                                          float step) const {
-    const openvdb::Vec3s low = corner(point);
+  /// The lowest corner of a point's cell, in voxels.
+  [[nodiscard]] openvdb::Vec3s cell(const openvdb::Vec3s& p) const {
+    return {below(p.x() * per_voxel_), below(p.y() * per_voxel_), below(p.z() * per_voxel_)};
+  }
+  [[nodiscard]] openvdb::Vec3s operator()(const openvdb::Vec3s& point, const openvdb::Vec3s& cell,
+                                          const MovableLayer::Move& move, float step) const {
     openvdb::Vec3s to;
     for (int axis = 0; axis < 3; ++axis) {
       const float p = point[axis], by = step * unit_ * static_cast<float>(move[static_cast<std::size_t>(axis)]);
-      const float down = 0.6F * (low[axis] - p) - more_, up = 0.6F * (low[axis] + voxel_ - p) + more_;
-      to[axis] = p + std::min(std::max(by, down), up);
+      const float low = voxel_ * cell[axis] - p, high = low + voxel_;
+      to[axis] = p + std::min(std::max(by, 0.6F * low - more_), 0.6F * high + more_);
     }
     return to;
   }
-  /// Are both in one cell?
-  [[nodiscard]] bool together(const openvdb::Vec3s& a, const openvdb::Vec3s& b) const { return corner(a) == corner(b); }
   [[nodiscard]] bool free() const { return more_ > 0; }
 
  private:
-  [[nodiscard]] openvdb::Vec3s corner(const openvdb::Vec3s& p) const {
-    return voxel_ * openvdb::Vec3s(std::floor(p.x() * per_voxel_), std::floor(p.y() * per_voxel_),
-                                   std::floor(p.z() * per_voxel_));
+  /// std::floor() is a call where the processor is not known to be able to.
+  [[nodiscard]] static float below(float x) {
+    const auto cut = static_cast<float>(static_cast<std::int32_t>(x));
+    return cut > x ? cut - 1 : cut;
   }
   float voxel_, per_voxel_, unit_, more_;  // longer than any move, if free
 };
 
 /// A mesh with its vertices on (or, as those of a dual surface, averaged below) a convex surface lies inside it and
 /// loses volume. To second order the loss is made good by moving each vertex along its normal by the normal part of its
-/// umbrella vector, mirrored; how far exactly, for all alike, is then set by the volume wanted. Flat faces, sharp
+/// umbrella vector, mirrored; how far exactly, for all alike, step_for_volume() says. Flat faces, sharp
 /// edges and, but in a stand-in, what lies beside one stay where they are: an edge is a bend beside something flat; a
 /// stick as thin as two voxels bends as much but has nothing flat around it. Vertices that share a cell stay too, for
 /// they might pass each other.
@@ -73,11 +74,10 @@ class KeepVolume {
   void add(QuadLayer&& layer, const Use& use);
   /// No more layers come.
   void finish(const Use& use);
-  /// By how much each move is to be taken, 0 to 2, so that the volume is `wanted_mm3`, or as near to it as that brings.
-  [[nodiscard]] double step(double wanted_mm3) const;
+  /// Six times the volume after a whole move, mm3.
+  [[nodiscard]] double six_volumes() const { return six_volumes_; }
 
  private:
-  static constexpr std::array<float, 4> steps{0, 1, 1.5F, 2};  // at which the volume is measured
   struct Umbrella {
     float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours; later x: their mean, along the normal
     float nx = 0, ny = 0, nz = 0;  // sum of quad normals; later of length 1
@@ -90,14 +90,14 @@ class KeepVolume {
   struct Work {
     MovableLayer layer;
     std::vector<Umbrella> mine, above;  // from quads of this layer, and of the next
-    std::array<std::vector<openvdb::Vec3s>, steps.size()> moved;
+    std::vector<openvdb::Vec3s> moved;  // if anything moves: the points after a whole move
   };
   void process(bool all, const Use& use);
   void sum_around(std::size_t n);
   void settle(std::size_t n);
   void look_around(std::size_t n);
   void choose_moves(std::size_t n);
-  [[nodiscard]] std::array<double, steps.size()> volume_of(std::size_t n) const;
+  [[nodiscard]] double volume_of(std::size_t n) const;
 
   double voxel_mm_;
   bool moving_;
@@ -105,7 +105,13 @@ class KeepVolume {
   std::deque<Work> window_;  // the first is done already, unless it is the very first
   // How many of the window have had their quads summed, their normals settled, ...
   std::size_t summed_ = 0, settled_ = 0, looked_ = 0, moved_ = 0, measured_ = 0;
-  std::array<double, steps.size()> volume_{};  // six times it, at each of the steps
+  double six_volumes_ = 0;
 };
+
+/// By how much each move is to be taken, 0 to 2, so that the volume is the one wanted, or as near to it as that brings:
+/// 1, unless a whole move misses it by a thousandth. Cost: up to one pass over the layers, parallel.
+/// @param layer  Gives the layer of a number, into the room if need be.
+[[nodiscard]] double step_for_volume(double wanted_mm3, double six_volumes, const Mover& mover, std::size_t layers,
+                                     const std::function<const MovableLayer&(std::size_t, MovableLayer&)>& layer);
 
 }  // namespace fibrolite

@@ -115,7 +115,9 @@ class Finisher {
     const std::size_t from = points_.size();
     if (from == 0) first_ = layer.first;
     const auto moved = [&](std::size_t i, float step) {
-      const openvdb::Vec3s p = layer.moves.empty() ? layer.points[i] : mover_(layer.points[i], layer.moves[i], step);
+      const openvdb::Vec3s p = layer.moves.empty()
+                                   ? layer.points[i]
+                                   : mover_(layer.points[i], mover_.cell(layer.points[i]), layer.moves[i], step);
       return Vec3f{p.x(), p.y(), p.z()};
     };
     points_.resize(from + layer.points.size());
@@ -220,7 +222,7 @@ struct SurfaceLayers::Impl {
   DualSurface dual;
   KeepVolume keep;
   LayerStore store;
-  double step = 0;
+  double step = 1;
   bool finished = false;
 };
 
@@ -254,7 +256,12 @@ void SurfaceLayers::add(const Solid& solid, const SampleRange& range, const Cont
 
 void SurfaceLayers::finish(double volume_mm3) {
   impl_->keep.finish([&](MovableLayer&& done) { impl_->push(std::move(done)); });
-  impl_->step = impl_->params.keep_volume ? impl_->keep.step(volume_mm3) : 1;
+  const LayerStore& store = impl_->store;
+  if (impl_->params.keep_volume) {
+    impl_->step = step_for_volume(
+        volume_mm3, impl_->keep.six_volumes(), Mover(impl_->grid.voxel_mm, impl_->params.stand_in), store.size(),
+        [&](std::size_t n, MovableLayer& room) -> const MovableLayer& { return store.layer(n, room); });
+  }
   impl_->finished = true;
 }
 
