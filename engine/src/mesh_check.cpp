@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cstddef>
+#include <cstring>
 #include <memory>
 #include <numeric>
 #include <utility>
@@ -29,6 +30,10 @@ using Range = tbb::blocked_range<std::size_t>;
 class Sets {
  public:
   explicit Sets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
+  /// Of which each begins in the set of another, with a smaller number, or its own.
+  explicit Sets(std::vector<std::uint32_t> parents) : parent_(std::move(parents)) {
+    for (std::uint32_t& up : parent_) up = parent_[up];
+  }
 
   std::uint32_t root(std::uint32_t a) {
     for (;;) {
@@ -43,9 +48,11 @@ class Sets {
     }
   }
 
+  [[nodiscard]] std::size_t size() const { return parent_.size(); }
   bool is_root(std::uint32_t a) const { return parent_[a] == a; }
 
   void join(std::uint32_t a, std::uint32_t b) {
+    if (load(a) == load(b)) return;  // as most neighbours
     for (;;) {
       a = root(a);
       b = root(b);
@@ -69,6 +76,44 @@ struct Arc {
   bool outward;
 };
 
+/// Of the triangles around a vertex: where each edge out of it leads, and where each edge into it comes from.
+constexpr std::uint32_t most_in_fan = 16;
+struct Fan {
+  std::array<std::uint32_t, most_in_fan> out, in;
+};
+
+/// For each triangle the one whose way out is its way in: 1 for each that is (there must be one), and the numbers of
+/// those. All lanes side by side; those that are not used count as 1 of themselves.
+template <int lanes>
+[[gnu::always_inline]] inline bool match(const Fan& fan, std::uint32_t count,
+                                         std::array<std::uint32_t, most_in_fan>& next) {
+  using Lanes [[gnu::vector_size(32)]] = std::uint32_t;
+  constexpr std::size_t blocks = lanes / 8;
+  std::array<Lanes, blocks> in, at{}, times{};
+  std::memcpy(in.data(), fan.in.data(), sizeof in);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (std::size_t b = 0; b < blocks; ++b) {
+      const Lanes same = in[b] == fan.out[i] ? Lanes{} + 1 : Lanes{};
+      times[b] += same;
+      at[b] += same * i;
+    }
+  }
+  std::array<std::uint32_t, lanes> found;
+  std::memcpy(found.data(), times.data(), sizeof found);
+  std::memcpy(next.data(), at.data(), sizeof at);
+  bool one = true;
+  for (std::uint32_t i = 0; i < count; ++i) one &= found[i] == 1;
+  return one;
+}
+[[gnu::target_clones("avx2", "default")]] bool match_8(const Fan& fan, std::uint32_t count,
+                                                       std::array<std::uint32_t, most_in_fan>& next) {
+  return match<8>(fan, count, next);
+}
+[[gnu::target_clones("avx2", "default")]] bool match_16(const Fan& fan, std::uint32_t count,
+                                                        std::array<std::uint32_t, most_in_fan>& next) {
+  return match<16>(fan, count, next);
+}
+
 struct Tally {
   std::int64_t vertices = 0, boundary_edges = 0, nonmanifold_edges = 0, nonmanifold_vertices = 0;
   std::vector<Arc> arcs;
@@ -85,8 +130,8 @@ std::uint32_t fan_root(std::vector<std::uint32_t>& fan, std::uint32_t a) {
 class Checker {
  public:
   void add(const MeshLayer& layer) {
-    if (layer.triangles.size() > 0xffffffffu / 3)
-      throw Error(Code::TooLarge, "a mesh of over 1,431,655,765 triangles cannot be checked");
+    if (layer.triangles.size() > 0xffffffffu / 4)
+      throw Error(Code::TooLarge, "a mesh of over 1,073,741,823 triangles cannot be checked");
     if (!begun_) {
       Box3d box;
       for (const Vec3f& v : layer.vertices) box.include(to_double(v));
@@ -203,13 +248,49 @@ class Checker {
   /// All vertices from first_ to end_, whose triangles are all there.
   void visit_all() {
     collect_corners();
-    shells_ = std::make_unique<Sets>(triangles_.size());
-    std::vector<std::uint32_t> of_shell(shell_count_, no_shell);
-    for (std::uint32_t t = 0; t < triangles_.size() && triangles_[t].shell != no_shell; ++t) {
-      std::uint32_t& one = of_shell[triangles_[t].shell];
-      if (one == no_shell) one = t;
-      shells_->join(one, t);
-    }
+    if (!visit_closed()) visit_any();
+  }
+
+  /// If each vertex has one closed fan, and says so. Then what shares a vertex is connected: sets of vertices, half as
+  /// many as triangles, that begin with a neighbour's.
+  bool visit_closed() {
+    const std::size_t count = end_ - first_;
+    std::vector<std::uint32_t> parents(count);
+    std::atomic<std::int64_t> used{0};
+    std::atomic<bool> closed{true};
+    tbb::parallel_for(Range(0, count, 1024), [&](const Range& range) {
+      std::int64_t mine = 0;
+      for (std::size_t v = range.begin(); v < range.end() && closed.load(std::memory_order_relaxed); ++v) {
+        const std::uint32_t begin = starts_[v], corners = starts_[v + 1] - begin;
+        auto least = static_cast<std::uint32_t>(first_ + v);
+        mine += corners > 0 ? 1 : 0;
+        if (corners > 0 && !closed_fan(begin, corners, [&](std::uint32_t, std::uint32_t from, std::uint32_t) {
+              if (from >= first_) least = std::min(least, from);
+            }))
+          closed = false;
+        parents[v] = least - static_cast<std::uint32_t>(first_);
+      }
+      used += mine;
+    });
+    if (!closed) return false;
+    result_.vertices += used;
+    by_vertex_ = true;
+    sets_ = std::make_unique<Sets>(std::move(parents));
+    join_shells();
+    tbb::parallel_for(Range(0, triangles_.size(), 4096), [&](const Range& range) {
+      for (std::size_t t = range.begin(); t < range.end(); ++t) {
+        const std::uint32_t one = node(t);
+        for (const std::uint32_t v : triangles_[t].corners)
+          if (v >= first_ && v < end_) sets_->join(one, v - static_cast<std::uint32_t>(first_));
+      }
+    });
+    return true;
+  }
+
+  void visit_any() {
+    by_vertex_ = false;
+    sets_ = std::make_unique<Sets>(triangles_.size());
+    join_shells();
     tbb::enumerable_thread_specific<Tally> tallies;
     tbb::parallel_for(Range(first_, end_, 1024), [&](const Range& range) {
       Tally& tally = tallies.local();
@@ -223,23 +304,43 @@ class Checker {
     }
   }
 
+  /// What stands for a triangle among the sets.
+  [[nodiscard]] std::uint32_t node(std::size_t t) const {
+    if (!by_vertex_) return static_cast<std::uint32_t>(t);
+    for (const std::uint32_t v : triangles_[t].corners)
+      if (v >= first_ && v < end_) return v - static_cast<std::uint32_t>(first_);
+    throw Error(Code::Internal, "a triangle reaches over more than two layers");
+  }
+
+  /// Triangles that are connected already: those with a shell come first.
+  void join_shells() {
+    std::vector<std::uint32_t> of_shell(shell_count_, no_shell);
+    for (std::uint32_t t = 0; t < triangles_.size() && triangles_[t].shell != no_shell; ++t) {
+      std::uint32_t& one = of_shell[triangles_[t].shell];
+      if (one == no_shell) one = node(t);
+      sets_->join(one, node(t));
+    }
+  }
+
   /// Triangles with a vertex that has not been visited stay; shells without any are whole.
   void keep_open() {
     const auto open = [this](const Triangle& t) {
       return std::any_of(t.corners.begin(), t.corners.end(), [this](std::uint32_t v) { return v >= end_; });
     };
-    std::vector<std::uint32_t> number(triangles_.size(), no_shell);
+    std::vector<std::uint32_t> number(sets_->size(), no_shell);
     shell_count_ = 0;
     std::size_t kept = 0;
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       if (!open(triangles_[t])) continue;
-      std::uint32_t& shell = number[shells_->root(t)];
+      std::uint32_t& shell = number[sets_->root(node(t))];
       if (shell == no_shell) shell = shell_count_++;
       triangles_[kept] = triangles_[t];
       triangles_[kept++].shell = shell;
     }
-    for (std::uint32_t t = 0; t < number.size(); ++t)
-      result_.shells += number[t] == no_shell && shells_->is_root(t) ? 1 : 0;
+    for (std::uint32_t i = 0; i < number.size(); ++i) {
+      const bool used = !by_vertex_ || starts_[i] != starts_[i + 1];
+      result_.shells += number[i] == no_shell && used && sets_->is_root(i) ? 1 : 0;
+    }
     triangles_.resize(kept);
   }
 
@@ -272,7 +373,7 @@ class Checker {
           for (std::size_t t = chunk * chunk_size; t < chunk_end(chunk); ++t) {
             for (std::uint32_t i = 0; i < 3; ++i) {
               const std::uint32_t v = triangles_[t].corners[i];
-              if (v - low < high - low) use(starts_[v - first_], 3 * static_cast<std::uint32_t>(t) + i);
+              if (v - low < high - low) use(starts_[v - first_], 4 * static_cast<std::uint32_t>(t) + i);
             }
           }
         }
@@ -286,33 +387,24 @@ class Checker {
     for_corners([&](std::uint32_t& start, std::uint32_t corner) { corners_[--start] = corner; });
   }
 
-  /// Nearly every vertex: its triangles follow each other around it once, each edge in both directions. Joins them and
-  /// says true; else does nothing.
-  bool closed_fan(std::uint32_t v, std::uint32_t begin, std::uint32_t count) const {
-    constexpr std::uint32_t most = 24;
-    if (count < 3 || count > most) return false;
-    struct Side {
-      std::uint32_t out, in, triangle;
-    };
-    std::array<Side, most> fan;
+  /// Nearly every vertex: its triangles follow each other around it once, each edge in both directions. If so calls
+  /// `use` with each corner, the vertex its edge comes from, and the corner next to it there.
+  template <class Use>
+  bool closed_fan(std::uint32_t begin, std::uint32_t count, const Use& use) const {
+    if (count < 3 || count > most_in_fan) return false;
+    Fan fan;
     for (std::uint32_t c = 0; c < count; ++c) {
-      const std::uint32_t triangle = corners_[begin + c] / 3, i = corners_[begin + c] % 3;
-      const auto& corners = triangles_[triangle].corners;
-      fan[c] = {corners[i == 2 ? 0 : i + 1], corners[i == 0 ? 2 : i - 1], triangle};
+      const std::uint32_t i = corners_[begin + c] & 3;
+      const auto& corners = triangles_[corners_[begin + c] >> 2].corners;
+      fan.out[c] = corners[i == 2 ? 0 : i + 1];
+      fan.in[c] = corners[i == 0 ? 2 : i - 1];
     }
-    for (std::uint32_t c = 0; c + 1 < count; ++c) {
-      std::uint32_t next = 0, matches = fan[0].out == fan[c].in ? 1 : 0;  // more than one: three or more at an edge
-      for (std::uint32_t i = c + 1; i < count; ++i) {
-        if (fan[i].out != fan[c].in) continue;
-        next = i;
-        ++matches;
-      }
-      if (next == 0 || matches > 1) return false;
-      std::swap(fan[c + 1], fan[next]);
-    }
-    if (fan[0].out != fan[count - 1].in) return false;
-    for (std::uint32_t c = 0; c < count; ++c)
-      if (v < fan[c].in) shells_->join(fan[c].triangle, fan[c + 1 < count ? c + 1 : 0].triangle);
+    std::array<std::uint32_t, most_in_fan> next;
+    if (!(count <= 8 ? match_8(fan, count, next) : match_16(fan, count, next))) return false;
+    std::uint32_t at = next[0], steps = 1;
+    for (; at != 0 && steps < count; ++steps) at = next[at];
+    if (at != 0 || steps != count) return false;
+    for (std::uint32_t c = 0; c < count; ++c) use(corners_[begin + c], fan.in[c], corners_[begin + next[c]]);
     return true;
   }
 
@@ -322,11 +414,14 @@ class Checker {
     const std::uint32_t begin = starts_[v - first_], count = starts_[v - first_ + 1] - begin;
     if (count == 0) return;
     ++tally.vertices;
-    if (closed_fan(v, begin, count)) return;
+    if (closed_fan(begin, count, [&](std::uint32_t mine, std::uint32_t from, std::uint32_t other) {
+          if (v < from) sets_->join(mine >> 2, other >> 2);
+        }))
+      return;
     tally.arcs.clear();
     tally.fan.resize(count);
     for (std::uint32_t c = 0; c < count; ++c) {
-      const std::uint32_t triangle = corners_[begin + c] / 3, i = corners_[begin + c] % 3;
+      const std::uint32_t triangle = corners_[begin + c] >> 2, i = corners_[begin + c] & 3;
       tally.arcs.push_back({triangles_[triangle].corners[(i + 1) % 3], c, true});
       tally.arcs.push_back({triangles_[triangle].corners[(i + 2) % 3], c, false});
       tally.fan[c] = c;
@@ -344,7 +439,7 @@ class Checker {
           --fans;
         }
         if (j > i && v < tally.arcs[i].other)
-          shells_->join(corners_[begin + tally.arcs[i].corner] / 3, corners_[begin + tally.arcs[j].corner] / 3);
+          sets_->join(corners_[begin + tally.arcs[i].corner] >> 2, corners_[begin + tally.arcs[j].corner] >> 2);
       }
       if (v > tally.arcs[i].other) continue;
       const auto triangles = static_cast<std::int64_t>(j - i);
@@ -362,10 +457,11 @@ class Checker {
   Box3d box_;                         // around them
   std::vector<Triangle> triangles_;   // with a vertex to visit
   std::vector<Triangle> next_;        // without
-  std::unique_ptr<Sets> shells_;
+  std::unique_ptr<Sets> sets_;        // of vertices to visit, or of triangles
+  bool by_vertex_ = false;
   std::uint32_t shell_count_ = 0;
-  std::size_t first_ = 0, end_ = 0;  // vertices to visit
-  std::vector<std::uint32_t> starts_, corners_;
+  std::size_t first_ = 0, end_ = 0;              // vertices to visit
+  std::vector<std::uint32_t> starts_, corners_;  // a corner: four times its triangle, and which of it
 };
 
 }  // namespace
