@@ -7,12 +7,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <numeric>
 #include <utility>
 
 #include "fibrolite/error.h"
+#include "leaf_bits.h"
 #include "vdb_access.h"
 
 namespace fibrolite {
@@ -96,6 +98,7 @@ Sheets sheets_of(unsigned inside, unsigned joined) {
 struct CrossedEdges {
   std::array<std::uint8_t, edges> list{};
   std::uint8_t count = 0;
+  std::array<float, 3> corners{};  ///< Where the edges begin, summed.
 };
 
 struct Tables {
@@ -108,8 +111,10 @@ struct Tables {
     for (unsigned inside = 0; inside < 256; ++inside) {
       CrossedEdges& mine = crossed[inside];
       for (unsigned e = 0; e < edges; ++e) {
-        if ((inside >> edge(e).from & 1U) != (inside >> edge(e).to & 1U))
+        if ((inside >> edge(e).from & 1U) != (inside >> edge(e).to & 1U)) {
           mine.list[mine.count++] = static_cast<std::uint8_t>(e);
+          for (unsigned axis = 0; axis < 3; ++axis) mine.corners[axis] += static_cast<float>(edge(e).from >> axis & 1U);
+        }
       }
       for (unsigned face = 0; face <= faces; ++face) sheets[inside][face] = sheets_of(inside, face);
       doubtful[inside] = no_face;
@@ -170,6 +175,17 @@ struct Samples {
   }
 };
 
+[[gnu::target_clones("avx2", "default")]] void rows_inside(const std::array<float, 9 * 9 * 9>& value,
+                                                           std::array<std::uint16_t, 81>& bits) {
+  std::array<std::uint8_t, 9 * 9 * 9> inside;
+  for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = value[i] < 0 ? 1 : 0;
+  for (std::size_t row = 0; row < 81; ++row) {
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, inside.data() + 9 * row, 8);
+    bits[row] = static_cast<std::uint16_t>(lowest_of_bytes(eight) | std::uint64_t{inside[9 * row + 8]} << 8);
+  }
+}
+
 /// Which corners of any cell are inside.
 unsigned corners_inside(const Coord& cell, const Access& access) {
   unsigned inside = 0;
@@ -188,11 +204,7 @@ class Cells {
   void run() {
     points_.clear();
     samples_.fetch(block_.origin, access_);
-    for (std::size_t row = 0; row < 81; ++row) {
-      unsigned bits = 0;
-      for (unsigned z = 0; z < 9; ++z) bits |= (samples_.value[row * 9 + z] < 0 ? 1U : 0U) << z;
-      block_.inside[row] = static_cast<std::uint16_t>(bits);
-    }
+    rows_inside(samples_.value, block_.inside);
     for (unsigned x = 0; x < 8; ++x) {
       for (unsigned y = 0; y < 8; ++y) {
         const std::array<unsigned, 4> rows{block_.inside[9 * x + y], block_.inside[9 * x + 9 + y],
@@ -217,24 +229,38 @@ class Cells {
 
     std::array<float, 8> v;
     for (unsigned c = 0; c < 8; ++c) v[c] = samples_.value[((x + (c & 1U)) * 9 + y + (c >> 1 & 1U)) * 9 + z + (c >> 2)];
-    std::array<std::array<float, 4>, 4> sum{};  // of each sheet; last their number
     const CrossedEdges& crossed = tables().crossed[inside];
-    for (std::size_t n = 0; n < crossed.count; ++n) {
-      const unsigned e = crossed.list[n];
-      const Edge ends = edge(e);
-      std::array<float, 4>& of = sum[sheets.of[e]];
-      const float a = v[ends.from], t = a / (a - v[ends.to]);
-      of[0] += static_cast<float>(ends.from & 1U);
-      of[1] += static_cast<float>(ends.from >> 1 & 1U);
-      of[2] += static_cast<float>(ends.from >> 2);
-      of[e / 4] += t;
-      of[3] += 1;
-    }
     const openvdb::Vec3s corner(static_cast<float>(block_.origin.x() + static_cast<int>(x)),
                                 static_cast<float>(block_.origin.y() + static_cast<int>(y)),
                                 static_cast<float>(block_.origin.z() + static_cast<int>(z)));
-    for (std::size_t s = 0; s < sheets.count; ++s)
-      points_.push_back(voxel_ * (corner + openvdb::Vec3s(sum[s][0], sum[s][1], sum[s][2]) / sum[s][3]));
+    std::array<std::array<float, 3>, 4> sum{};  // of each sheet
+    if (sheets.count == 1) {                    // nearly always
+      sum[0] = crossed.corners;
+      for (std::size_t n = 0; n < crossed.count; ++n) {
+        const unsigned e = crossed.list[n];
+        const float a = v[edge(e).from];
+        sum[0][e / 4] += a / (a - v[edge(e).to]);
+      }
+      points_.push_back(placed(corner, sum[0], static_cast<float>(crossed.count)));
+      return;
+    }
+    std::array<float, 4> number{};
+    for (std::size_t n = 0; n < crossed.count; ++n) {
+      const unsigned e = crossed.list[n];
+      const Edge ends = edge(e);
+      const float a = v[ends.from];
+      std::array<float, 3>& of = sum[sheets.of[e]];
+      of[0] += static_cast<float>(ends.from & 1U);
+      of[1] += static_cast<float>(ends.from >> 1 & 1U);
+      of[2] += static_cast<float>(ends.from >> 2);
+      of[e / 4] += a / (a - v[ends.to]);
+      number[sheets.of[e]] += 1;
+    }
+    for (std::size_t s = 0; s < sheets.count; ++s) points_.push_back(placed(corner, sum[s], number[s]));
+  }
+  [[nodiscard]] openvdb::Vec3s placed(const openvdb::Vec3s& corner, const std::array<float, 3>& sum,
+                                      float number) const {
+    return voxel_ * (corner + openvdb::Vec3s(sum[0], sum[1], sum[2]) * (1 / number));
   }
 
   /// The doubtful face, if it is doubtful seen from its other side too.
