@@ -20,6 +20,71 @@ struct Lattice : Shape::Function {
   virtual void apart(const PointBlock& block, float* bond, float* node) const = 0;
 };
 
+// Eight points at a time, written as vectors so that nothing branches, which the compiler does not find by itself. All
+// of it is inlined into functions that exist for AVX2 too.
+using Lanes [[gnu::vector_size(32)]] = float;
+using Mask [[gnu::vector_size(32)]] = std::int32_t;  // a lane is all ones or zero
+constexpr int lanes = 8;
+
+/// To the nearest integer without a call: the constant pushes the fraction out of the mantissa.
+constexpr float push = 12582912.0F;  // 1.5 * 2^23
+
+/// |coordinates| in the Voronoi cell of the nearest A node, quarter cells, axes in place; whether the product of the
+/// coordinates is negative.
+struct Folded {
+  Lanes a, b, c;
+  Mask negative;
+};
+
+[[gnu::always_inline]] inline void smaller(Lanes& of, const Lanes& other) { of = other < of ? other : of; }
+[[gnu::always_inline]] inline void fold(Lanes x, Lanes y, Lanes z, Folded& to) {
+  const Lanes ex = 2.0F * ((0.5F * x + push) - push), ey = 2.0F * ((0.5F * y + push) - push),
+              ez = 2.0F * ((0.5F * z + push) - push);
+  x -= ex, y -= ey, z -= ez;
+  // Even corners with an odd half sum are no A nodes: step over along the axis with the largest remainder.
+  const Lanes half_sum = 0.5F * (ex + ey + ez);
+  const Mask odd = half_sum != 2.0F * ((0.5F * half_sum + push) - push);
+  to.negative = (x < 0) ^ (y < 0) ^ (z < 0) ^ odd;
+  const Lanes a = x < 0 ? -x : x, b = y < 0 ? -y : y, c = z < 0 ? -z : z;
+  const Lanes bc = b < c ? c : b, largest = a < bc ? bc : a;
+  const Mask step_a = odd & (a == largest), step_b = odd & ~step_a & (b == largest), step_c = odd & ~step_a & ~step_b;
+  to.a = step_a ? 2.0F - a : a;
+  to.b = step_b ? 2.0F - b : b;
+  to.c = step_c ? 2.0F - c : c;
+}
+
+/// Squared distances to the nearest bond and node of all points of a block. `nearest` gets them eight at a time,
+/// folded.
+/// @param cells  Quarter cells to a mm.
+template <class Nearest>
+[[gnu::always_inline]] inline void each_eight(const PointBlock& block, Vec3f shift, Vec3f cells, const Nearest& nearest,
+                                              float* bond, float* node) {
+  std::array<float, 3 * lanes> rest{};
+  for (int i = 0; i < block.count; i += lanes) {
+    const std::size_t n = sizeof(float) * static_cast<std::size_t>(std::min(lanes, block.count - i));
+    const bool whole = i + lanes <= block.count;
+    if (!whole) {
+      std::memcpy(rest.data(), block.x + i, n);
+      std::memcpy(rest.data() + lanes, block.y + i, n);
+      std::memcpy(rest.data() + 2 * lanes, block.z + i, n);
+    }
+    Lanes x, y, z, to_bond, to_node;
+    std::memcpy(&x, whole ? block.x + i : rest.data(), sizeof x);
+    std::memcpy(&y, whole ? block.y + i : rest.data() + lanes, sizeof y);
+    std::memcpy(&z, whole ? block.z + i : rest.data() + 2 * lanes, sizeof z);
+    Folded folded;
+    fold((x - shift.x) * cells.x, (y - shift.y) * cells.y, (z - shift.z) * cells.z, folded);
+    nearest(folded, to_bond, to_node);
+    std::memcpy(bond + i, &to_bond, n);
+    std::memcpy(node + i, &to_node, n);
+  }
+}
+
+/// From squares to distances.
+[[gnu::always_inline]] inline void take_roots(int count, float unit, float* squared) {
+  for (int i = 0; i < count; ++i) squared[i] = std::sqrt(squared[i]) * unit;
+}
+
 /// Exact distance to the diamond lattice in O(1), by folding.
 ///
 /// In quarter cells the nodes are A, the points with even coordinates whose sum is divisible by 4, and B = A + (1,1,1);
@@ -33,171 +98,103 @@ struct Crystal final : Lattice {
         stretch(static_cast<float>(stretch_z)),
         stick(static_cast<float>(r.stick_mm)),
         ball(static_cast<float>(r.ball_mm)),
-        shift(shift_mm) {}
+        shift(to_float(shift_mm)) {}
 
   void evaluate(const PointBlock& block, float* out) const override {
-    const auto sx = static_cast<float>(shift.x), sy = static_cast<float>(shift.y), sz = static_cast<float>(shift.z);
-    if (stretch == 1.0F) {
-      cubic(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stick, ball, out);
-    } else {
-      stretched(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stretch, stick, ball, out);
-    }
+    (stretch == 1.0F ? cubic : stretched)(block, shift, quarter, stretch, stick, ball, out);
   }
-
   void apart(const PointBlock& block, float* bond, float* node) const override {
-    const auto sx = static_cast<float>(shift.x), sy = static_cast<float>(shift.y), sz = static_cast<float>(shift.z);
-    if (stretch == 1.0F) {
-      cubic_apart(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, bond, node);
-    } else {
-      stretched_apart(block.x, block.y, block.z, block.count, sx, sy, sz, quarter, stretch, bond, node);
-    }
+    (stretch == 1.0F ? cubic_apart : stretched_apart)(block, shift, quarter, stretch, bond, node);
   }
 
-  struct Folded {
-    float a, b, c;  // |coordinate| in the Voronoi cell of the origin, quarter cells, axes in place
-    float sign;     // of the product of the coordinates
-  };
-  /// The two ways to the nearest even number without a call: the constant pushes the fraction out of the mantissa.
-  static constexpr float push = 12582912.0F;  // 1.5 * 2^23
-  static float nearest_even(float v) { return 2.0F * ((0.5F * v + push) - push); }
-  static Folded fold(float x, float y, float z) {
-    const float ex = nearest_even(x), ey = nearest_even(y), ez = nearest_even(z);
-    const float rx = x - ex, ry = y - ey, rz = z - ez;
-    float a = std::abs(rx), b = std::abs(ry), c = std::abs(rz);
-    float sign = (rx < 0 ? -1.0F : 1.0F) * (ry < 0 ? -1.0F : 1.0F) * (rz < 0 ? -1.0F : 1.0F);
-    // Even corners with an odd half sum are no A nodes: step over along the axis with the largest remainder.
-    const bool odd = (static_cast<int>(0.5F * (ex + ey + ez)) & 1) != 0;
-    const float largest = std::max(a, std::max(b, c));
-    const bool step_a = odd && a == largest, step_b = odd && !step_a && b == largest,
-               step_c = odd && !step_a && !step_b;
-    a = step_a ? 2.0F - a : a;
-    b = step_b ? 2.0F - b : b;
-    c = step_c ? 2.0F - c : c;
-    sign = odd ? -sign : sign;
-    return {a, b, c, sign};
-  }
-
-  struct Nearest {
-    float bond, node;  // squared, quarter cells
-  };
-
-  /// Squared distances to the nearest bond and node, quarter cells, eight points at a time: fold() written so that
-  /// nothing branches, which the compiler does not find by itself.
-  [[gnu::always_inline]] static inline void nearest_cubic(const float* px, const float* py, const float* pz, int count,
-                                                          float sx, float sy, float sz, float quarter, float* bond,
-                                                          float* node) {
-    using Lanes [[gnu::vector_size(32)]] = float;
-    using Mask [[gnu::vector_size(32)]] = std::int32_t;  // a lane is all ones or zero
-    constexpr int lanes = 8;
-    const float inverse = 1.0F / quarter;
-    std::array<float, 3 * lanes> rest{};
-    for (int i = 0; i < count; i += lanes) {
-      const std::size_t n = sizeof(float) * static_cast<std::size_t>(std::min(lanes, count - i));
-      const bool whole = i + lanes <= count;
-      if (!whole) {
-        std::memcpy(rest.data(), px + i, n);
-        std::memcpy(rest.data() + lanes, py + i, n);
-        std::memcpy(rest.data() + 2 * lanes, pz + i, n);
-      }
-      Lanes x, y, z;
-      std::memcpy(&x, whole ? px + i : rest.data(), sizeof x);
-      std::memcpy(&y, whole ? py + i : rest.data() + lanes, sizeof y);
-      std::memcpy(&z, whole ? pz + i : rest.data() + 2 * lanes, sizeof z);
-      x = (x - sx) * inverse, y = (y - sy) * inverse, z = (z - sz) * inverse;
-      const Lanes ex = 2.0F * ((0.5F * x + push) - push), ey = 2.0F * ((0.5F * y + push) - push),
-                  ez = 2.0F * ((0.5F * z + push) - push);
-      x -= ex, y -= ey, z -= ez;
-      const Lanes half_sum = 0.5F * (ex + ey + ez);
-      const Mask odd = half_sum != 2.0F * ((0.5F * half_sum + push) - push);
-      const Mask flip = (x < 0) ^ (y < 0) ^ (z < 0) ^ odd;
-      Lanes a = x < 0 ? -x : x, b = y < 0 ? -y : y, c = z < 0 ? -z : z;
-      const Lanes bc = b < c ? c : b, largest = a < bc ? bc : a;
-      const Mask step_a = odd & (a == largest), step_b = odd & ~step_a & (b == largest),
-                 step_c = odd & ~step_a & ~step_b;
-      a = step_a ? 2.0F - a : a;
-      b = step_b ? 2.0F - b : b;
-      c = step_c ? 2.0F - c : c;
-
-      const Lanes most = b < c ? c : b, least = b < c ? b : c;
-      const Lanes high = a < most ? most : a, low = least < a ? least : a;
-      const Lanes u = high, v = a + b + c - high - low, w = flip ? -low : low;
+  struct Cubic {
+    [[gnu::always_inline]] void operator()(const Folded& f, Lanes& bond, Lanes& node) const {
+      const Lanes most = f.b < f.c ? f.c : f.b, least = f.b < f.c ? f.b : f.c;
+      const Lanes high = f.a < most ? most : f.a, low = least < f.a ? least : f.a;
+      const Lanes u = high, v = f.a + f.b + f.c - high - low, w = f.negative ? -low : low;
       Lanes t = (u + v + w) * (1.0F / 3.0F);
       t = t < 0 ? Lanes{} : t;
       t = t > 1 ? Lanes{} + 1.0F : t;
-      const Lanes to_bond = (u - t) * (u - t) + (v - t) * (v - t) + (w - t) * (w - t);
-      const Lanes first = u * u + v * v + w * w, second = (u - 1) * (u - 1) + (v - 1) * (v - 1) + (w - 1) * (w - 1);
-      const Lanes to_node = second < first ? second : first;
-      std::memcpy(bond + i, &to_bond, n);
-      std::memcpy(node + i, &to_node, n);
+      bond = (u - t) * (u - t) + (v - t) * (v - t) + (w - t) * (w - t);
+      node = u * u + v * v + w * w;
+      smaller(node, (u - 1) * (u - 1) + (v - 1) * (v - 1) + (w - 1) * (w - 1));
     }
-  }
+  };
 
-  [[gnu::target_clones("avx2", "default")]] static void cubic(const float* px, const float* py, const float* pz,
-                                                              int count, float sx, float sy, float sz, float quarter,
-                                                              float stick, float ball, float* out) {
+  struct Stretched {
+    float k;  // of z
+
+    /// From p to the bond from a along d.
+    [[gnu::always_inline]] void to_bond(const Lanes& x, const Lanes& y, const Lanes& z, Vec3f a, Vec3f d,
+                                        Lanes& least) const {
+      const float dz = d.z * k, per = 1 / (d.x * d.x + d.y * d.y + dz * dz);
+      const Lanes px = x - a.x, py = y - a.y, pz = (z - a.z) * k;
+      Lanes t = (px * d.x + py * d.y + pz * dz) * per;
+      t = t < 0 ? Lanes{} : t;
+      t = t > 1 ? Lanes{} + 1.0F : t;
+      const Lanes ux = px - t * d.x, uy = py - t * d.y, uz = pz - t * dz;
+      smaller(least, ux * ux + uy * uy + uz * uz);
+    }
+    [[gnu::always_inline]] void operator()(const Folded& f, Lanes& bond, Lanes& node) const {
+      const Lanes x = f.a < f.b ? f.b : f.a, y = f.a < f.b ? f.a : f.b, z = f.negative ? -f.c : f.c;
+      bond = Lanes{} + far_mm;
+      to_bond(x, y, z, {0, 0, 0}, {1, 1, 1}, bond);
+      to_bond(x, y, z, {0, 0, 0}, {1, -1, -1}, bond);
+      to_bond(x, y, z, {2, 0, -2}, {-1, -1, 1}, bond);
+      to_bond(x, y, z, {2, 0, 2}, {-1, 1, -1}, bond);
+      const float kk = k * k;
+      node = x * x + y * y + kk * z * z;
+      smaller(node, (x - 1) * (x - 1) + (y - 1) * (y - 1) + kk * (z - 1) * (z - 1));
+      smaller(node, (x - 1) * (x - 1) + (y + 1) * (y + 1) + kk * (z + 1) * (z + 1));
+    }
+  };
+
+  template <class Nearest>
+  [[gnu::always_inline]] static inline void apart_by(const Nearest& nearest, const PointBlock& block, Vec3f shift,
+                                                     float quarter, float k, float* bond, float* node) {
+    const float inverse = 1.0F / quarter;
+    each_eight(block, shift, {inverse, inverse, inverse / k}, nearest, bond, node);
+    take_roots(block.count, quarter, bond);
+    take_roots(block.count, quarter, node);
+  }
+  template <class Nearest>
+  [[gnu::always_inline]] static inline void joined_by(const Nearest& nearest, const PointBlock& block, Vec3f shift,
+                                                      float quarter, float k, float stick, float ball, float* out) {
     std::array<float, PointBlock::capacity> bond, node;
-    nearest_cubic(px, py, pz, count, sx, sy, sz, quarter, bond.data(), node.data());
-    for (int i = 0; i < count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      out[i] = std::min(std::sqrt(bond[k]) * quarter - stick, std::sqrt(node[k]) * quarter - ball);
-    }
-  }
-  [[gnu::target_clones("avx2", "default")]] static void cubic_apart(const float* px, const float* py, const float* pz,
-                                                                    int count, float sx, float sy, float sz,
-                                                                    float quarter, float* bond, float* node) {
-    nearest_cubic(px, py, pz, count, sx, sy, sz, quarter, bond, node);
-    for (int i = 0; i < count; ++i) {
-      bond[i] = std::sqrt(bond[i]) * quarter;
-      node[i] = std::sqrt(node[i]) * quarter;
+    apart_by(nearest, block, shift, quarter, k, bond.data(), node.data());
+    for (int i = 0; i < block.count; ++i) {
+      const auto n = static_cast<std::size_t>(i);
+      out[i] = std::min(bond[n] - stick, node[n] - ball);
     }
   }
 
-  /// Squared distance from p to the bond from a along d, z stretched by k.
-  static float bond2(float x, float y, float z, float ax, float ay, float az, float dx, float dy, float dz, float k) {
-    const float px = x - ax, py = y - ay, pz = (z - az) * k, qz = dz * k;
-    const float t = std::min(std::max((px * dx + py * dy + pz * qz) / (dx * dx + dy * dy + qz * qz), 0.0F), 1.0F);
-    const float ux = px - t * dx, uy = py - t * dy, uz = pz - t * qz;
-    return ux * ux + uy * uy + uz * uz;
+  [[gnu::target_clones("avx2", "default")]] static void cubic(const PointBlock& block, Vec3f shift, float quarter,
+                                                              float k, float stick, float ball, float* out) {
+    joined_by(Cubic{}, block, shift, quarter, k, stick, ball, out);
   }
-
-  static Nearest nearest_stretched(float px, float py, float pz, float k) {
-    const Folded f = fold(px, py, pz);
-    const float x = std::max(f.a, f.b), y = std::min(f.a, f.b), z = f.c * f.sign;
-    return {std::min(std::min(bond2(x, y, z, 0, 0, 0, 1, 1, 1, k), bond2(x, y, z, 0, 0, 0, 1, -1, -1, k)),
-                     std::min(bond2(x, y, z, 2, 0, -2, -1, -1, 1, k), bond2(x, y, z, 2, 0, 2, -1, 1, -1, k))),
-            std::min(x * x + y * y + k * k * z * z,
-                     std::min((x - 1) * (x - 1) + (y - 1) * (y - 1) + k * k * (z - 1) * (z - 1),
-                              (x - 1) * (x - 1) + (y + 1) * (y + 1) + k * k * (z + 1) * (z + 1)))};
+  [[gnu::target_clones("avx2", "default")]] static void stretched(const PointBlock& block, Vec3f shift, float quarter,
+                                                                  float k, float stick, float ball, float* out) {
+    joined_by(Stretched{k}, block, shift, quarter, k, stick, ball, out);
   }
-  static void stretched(const float* px, const float* py, const float* pz, int count, float sx, float sy, float sz,
-                        float quarter, float k, float stick, float ball, float* out) {
-    const float inverse = 1.0F / quarter;
-    for (int i = 0; i < count; ++i) {
-      const Nearest n =
-          nearest_stretched((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse / k, k);
-      out[i] = std::min(std::sqrt(n.bond) * quarter - stick, std::sqrt(n.node) * quarter - ball);
-    }
+  [[gnu::target_clones("avx2", "default")]] static void cubic_apart(const PointBlock& block, Vec3f shift, float quarter,
+                                                                    float k, float* bond, float* node) {
+    apart_by(Cubic{}, block, shift, quarter, k, bond, node);
   }
-  static void stretched_apart(const float* px, const float* py, const float* pz, int count, float sx, float sy,
-                              float sz, float quarter, float k, float* bond, float* node) {
-    const float inverse = 1.0F / quarter;
-    for (int i = 0; i < count; ++i) {
-      const Nearest n =
-          nearest_stretched((px[i] - sx) * inverse, (py[i] - sy) * inverse, (pz[i] - sz) * inverse / k, k);
-      bond[i] = std::sqrt(n.bond) * quarter;
-      node[i] = std::sqrt(n.node) * quarter;
-    }
+  [[gnu::target_clones("avx2", "default")]] static void stretched_apart(const PointBlock& block, Vec3f shift,
+                                                                        float quarter, float k, float* bond,
+                                                                        float* node) {
+    apart_by(Stretched{k}, block, shift, quarter, k, bond, node);
   }
 
   float quarter, stretch, stick, ball;
-  Vec3d shift;
+  Vec3f shift;
 };
 
-/// Exact distance for any edges of the cell, a few times slower. Folding may not exchange axes now, and which bonds can
-/// be nearest to a folded point depends on the edges: they are found once.
+/// Exact distance for any edges of the cell. Folding may not exchange axes now, and which bonds can be nearest to a
+/// folded point depends on the edges: they are found once.
 struct AnyCell final : Lattice {
   AnyCell(const CellEdges& cell, const Radii& r, Vec3d shift_mm)
-      : quarter{0.25 * cell.x, 0.25 * cell.y, 0.25 * cell.z}, radii(r), shift(shift_mm) {
+      : quarter{0.25 * cell.x, 0.25 * cell.y, 0.25 * cell.z}, radii(r), shift(to_float(shift_mm)) {
     choose();
   }
 
@@ -210,38 +207,44 @@ struct AnyCell final : Lattice {
   }
 
   void apart(const PointBlock& block, float* bond, float* node) const override {
-    const Vec3f q = to_float(quarter), s = to_float(shift);
-    std::array<float, PointBlock::capacity> x, y, z;
-    const auto count = static_cast<std::size_t>(block.count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Crystal::Folded f =
-          Crystal::fold((block.x[i] - s.x) / q.x, (block.y[i] - s.y) / q.y, (block.z[i] - s.z) / q.z);
-      x[i] = f.a * q.x;
-      y[i] = f.b * q.y;
-      z[i] = f.c * f.sign * q.z;
-      bond[i] = node[i] = far_mm;
-    }
-    for (const Bond& b : bonds)
-      for (std::size_t i = 0; i < count; ++i) {
-        const float px = x[i] - b.a.x, py = y[i] - b.a.y, pz = z[i] - b.a.z;
-        const float t = std::min(std::max(px * b.per.x + py * b.per.y + pz * b.per.z, 0.0F), 1.0F);
-        const float ux = px - t * b.along.x, uy = py - t * b.along.y, uz = pz - t * b.along.z;
-        bond[i] = std::min(bond[i], ux * ux + uy * uy + uz * uz);
-      }
-    for (const Vec3f& n : nodes)
-      for (std::size_t i = 0; i < count; ++i) {
-        const float px = x[i] - n.x, py = y[i] - n.y, pz = z[i] - n.z;
-        node[i] = std::min(node[i], px * px + py * py + pz * pz);
-      }
-    for (std::size_t i = 0; i < count; ++i) {
-      bond[i] = std::sqrt(bond[i]);
-      node[i] = std::sqrt(node[i]);
-    }
+    run(block, shift, {to_float(quarter), bonds.data(), bonds.size(), nodes.data(), nodes.size()}, bond, node);
   }
 
   struct Bond {
     Vec3f a, along, per;  // from a, by `along`; per = along / |along|^2
   };
+  struct Nearest {
+    Vec3f edges;  // of a quarter cell, mm
+    const Bond* bonds;
+    std::size_t bond_count;
+    const Vec3f* nodes;
+    std::size_t node_count;
+
+    [[gnu::always_inline]] void operator()(const Folded& f, Lanes& bond, Lanes& node) const {
+      const Lanes x = f.a * edges.x, y = f.b * edges.y, z = (f.negative ? -f.c : f.c) * edges.z;
+      bond = node = Lanes{} + far_mm;
+      for (std::size_t i = 0; i < bond_count; ++i) {
+        const Bond& b = bonds[i];
+        const Lanes px = x - b.a.x, py = y - b.a.y, pz = z - b.a.z;
+        Lanes t = px * b.per.x + py * b.per.y + pz * b.per.z;
+        t = t < 0 ? Lanes{} : t;
+        t = t > 1 ? Lanes{} + 1.0F : t;
+        const Lanes ux = px - t * b.along.x, uy = py - t * b.along.y, uz = pz - t * b.along.z;
+        smaller(bond, ux * ux + uy * uy + uz * uz);
+      }
+      for (std::size_t i = 0; i < node_count; ++i) {
+        const Lanes px = x - nodes[i].x, py = y - nodes[i].y, pz = z - nodes[i].z;
+        smaller(node, px * px + py * py + pz * pz);
+      }
+    }
+  };
+  [[gnu::target_clones("avx2", "default")]] static void run(const PointBlock& block, Vec3f shift,
+                                                            const Nearest& nearest, float* bond, float* node) {
+    const Vec3f& q = nearest.edges;
+    each_eight(block, shift, {1 / q.x, 1 / q.y, 1 / q.z}, nearest, bond, node);
+    take_roots(block.count, 1, bond);
+    take_roots(block.count, 1, node);
+  }
 
   /// Keeps what is nearest to some place a folded point can be at. Places are looked at in a raster; whatever is
   /// nearest between them is, at the place of the raster beside it, farther than the nearest by at most twice the way
@@ -292,7 +295,7 @@ struct AnyCell final : Lattice {
 
   Vec3d quarter;
   Radii radii;
-  Vec3d shift;
+  Vec3f shift;
   std::vector<Bond> bonds;
   std::vector<Vec3f> nodes;
 };
