@@ -279,6 +279,13 @@ class Checker {
     join_shells();
     tbb::parallel_for(Range(0, triangles_.size(), 4096), [&](const Range& range) {
       for (std::size_t t = range.begin(); t < range.end(); ++t) {
+        const auto& [a, b, c] = triangles_[t].corners;
+        if (std::min({a, b, c}) >= first_ && std::max({a, b, c}) < end_) {
+          const auto from = static_cast<std::uint32_t>(first_);
+          sets_->join(a - from, b - from);
+          sets_->join(a - from, c - from);
+          continue;
+        }
         const std::uint32_t one = node(t);
         for (const std::uint32_t v : triangles_[t].corners)
           if (v >= first_ && v < end_) sets_->join(one, v - static_cast<std::uint32_t>(first_));
