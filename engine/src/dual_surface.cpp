@@ -214,7 +214,7 @@ class Cells {
           cell(x, y, static_cast<unsigned>(std::countr_zero(mixed)), rows);
       }
     }
-    block_.points = points_;
+    block_.points.assign(points_.begin(), points_.end());
   }
 
  private:
@@ -283,7 +283,15 @@ class Cells {
 
 struct DualSurface::Impl {
   using Key = std::array<int, 3>;  // of an origin, the axis first
-  using Layer = std::vector<Block>;
+  /// Its blocks are the first `count`; the others have been used before and keep their memory.
+  struct Layer {
+    std::vector<Block> blocks;
+    std::size_t count = 0;
+    void resize(std::size_t n) {
+      count = n;
+      if (blocks.size() < n) blocks.resize(n);
+    }
+  };
 
   Impl(Grid g, int along) : grid(g), axis(static_cast<std::size_t>(along)) {}
 
@@ -326,7 +334,9 @@ struct DualSurface::Impl {
 
   [[nodiscard]] QuadLayer add_layer(const Tree& tree, const Coord* from, const Coord* to) {
     const auto count = static_cast<std::size_t>(to - from);
-    Layer layer(count);
+    std::swap(layer, below);
+    layer.resize(count);
+    std::vector<Block>& blocks = layer.blocks;
     const auto each = [&](const auto& work) {
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 8), [&](const auto& some) {
         for (std::size_t i = some.begin(); i < some.end(); ++i) work(i);
@@ -336,46 +346,45 @@ struct DualSurface::Impl {
       const Access access(tree);
       thread_local std::vector<openvdb::Vec3s> room;
       for (std::size_t i = some.begin(); i < some.end(); ++i) {
-        layer[i].origin = from[i];
-        Cells(layer[i], access, static_cast<float>(grid.voxel_mm), room).run();
+        blocks[i].origin = from[i];
+        Cells(blocks[i], access, static_cast<float>(grid.voxel_mm), room).run();
       }
     });
     std::size_t points = out_points;
-    for (Block& block : layer) {
-      block.base = points;
-      points += block.points.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      blocks[i].base = points;
+      points += blocks[i].points.size();
     }
     if (points >= std::numeric_limits<std::uint32_t>::max())
       throw Error(Code::TooLarge, "the surface has more vertices than a mesh can hold", {}, "use a larger --voxel");
-    each([&](std::size_t i) { add_quads(layer, i); });
+    each([&](std::size_t i) { add_quads(i); });
 
     std::vector<std::size_t> quads{0};
-    for (const Block& block : layer) quads.push_back(quads.back() + block.quads.size());
+    for (std::size_t i = 0; i < count; ++i) quads.push_back(quads.back() + blocks[i].quads.size());
     QuadLayer out;
     out.first = out_points;
     out.points.resize(points - out_points);
     out.quads.resize(quads.back());
     each([&](std::size_t i) {
-      Block& block = layer[i];
+      const Block& block = blocks[i];
       std::copy(block.points.begin(), block.points.end(),
                 out.points.begin() + static_cast<std::ptrdiff_t>(block.base - out_points));
       std::copy(block.quads.begin(), block.quads.end(), out.quads.begin() + static_cast<std::ptrdiff_t>(quads[i]));
-      block.points = {};
-      block.quads = {};
     });
     out_points = points;
-    below = std::move(layer);
     return out;
   }
 
-  [[nodiscard]] const Block* find(const Layer& layer, const Coord& origin) const {
-    const auto at = std::lower_bound(layer.begin(), layer.end(), key(origin),
+  [[nodiscard]] const Block* find(const Layer& in, const Coord& origin) const {
+    const auto end = in.blocks.begin() + static_cast<std::ptrdiff_t>(in.count);
+    const auto at = std::lower_bound(in.blocks.begin(), end, key(origin),
                                      [&](const Block& b, const Key& k) { return key(b.origin) < k; });
-    return at != layer.end() && at->origin == origin ? &*at : nullptr;
+    return at != end && at->origin == origin ? &*at : nullptr;
   }
 
-  void add_quads(Layer& layer, std::size_t number) const {
-    Block& block = layer[number];
+  void add_quads(std::size_t number) {
+    Block& block = layer.blocks[number];
+    block.quads.clear();
     block.quads.reserve(block.points.size() + 32);  // about one for each vertex
     // Those on the lower sides, at bits 2, 1, 0 for x, y, z.
     std::array<const Block*, 8> lower{&block};
@@ -418,7 +427,7 @@ struct DualSurface::Impl {
 
   const Grid grid;
   const std::size_t axis;
-  Layer below;  ///< The layer before, for the quads that reach into it.
+  Layer layer, below;  ///< The one made last, and the one before: quads reach into that.
   std::size_t out_points = 0;
 };
 

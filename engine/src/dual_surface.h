@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
 #include "fibrolite/context.h"
@@ -17,11 +19,31 @@ namespace fibrolite {
 
 using Quad = std::array<std::uint32_t, 4>;  ///< Of vertices, counter-clockwise from outside.
 
+/// Leaves new elements as they are: they are written over in parallel, which also shares out the cost of fresh memory.
+template <class T>
+struct Unwritten : std::allocator<T> {
+  template <class U>
+  struct rebind {  // NOLINT(readability-identifier-naming): the name the standard asks for
+    using other = Unwritten<U>;
+  };
+  template <class U, class... Args>
+  void construct(U* at, Args&&... args) {
+    if constexpr (sizeof...(Args) == 0) {
+      ::new (static_cast<void*>(at)) U;
+    } else {
+      ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
+    }
+  }
+};
+
+using Points = std::vector<openvdb::Vec3s, Unwritten<openvdb::Vec3s>>;
+using Quads = std::vector<Quad, Unwritten<Quad>>;
+
 /// Of a layer of blocks.
 struct QuadLayer {
-  std::vector<openvdb::Vec3s> points;  ///< mm.
-  std::size_t first = 0;               ///< Number of its first vertex among all.
-  std::vector<Quad> quads;             ///< Of its vertices and those of the layer before.
+  Points points;          ///< mm.
+  std::size_t first = 0;  ///< Number of its first vertex among all.
+  Quads quads;            ///< Of its vertices and those of the layer before.
 };
 
 /// Cells of eight neighbouring samples get a vertex for each sheet of the surface that runs through them: the mean of

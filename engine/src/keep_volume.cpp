@@ -159,7 +159,7 @@ void KeepVolume::choose_moves(std::size_t n) {
   Work& work = window_[n];
   const float per_unit = 1 / move_unit(voxel_mm_);
   const std::size_t count = work.mine.size();
-  const std::vector<Vec3s>& points = work.layer.points;
+  const Points& points = work.layer.points;
   work.layer.moves.resize(count);
   work.moved.resize(count);
   Vec3s cell, next = count > 0 ? mover_.cell(points[0]) : Vec3s(0);

@@ -90,7 +90,7 @@ class KeepVolume {
   struct Work {
     MovableLayer layer;
     std::vector<Umbrella> mine, above;  // from quads of this layer, and of the next
-    std::vector<openvdb::Vec3s> moved;  // if anything moves: the points after a whole move
+    Points moved;                       // if anything moves: the points after a whole move
   };
   void process(bool all, const Use& use);
   void sum_around(std::size_t n);

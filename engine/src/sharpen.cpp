@@ -25,7 +25,7 @@ constexpr double least_eigenvalue = 0.1;
 
 struct FacedSurface {
   std::vector<Vec3d> points;
-  std::vector<Quad> quads;  ///< Counterclockwise from outside.
+  Quads quads;  ///< Counterclockwise from outside.
   std::vector<Vec3d> normals;
 };
 

@@ -143,7 +143,7 @@ class Finisher {
   [[nodiscard]] bool degenerate(const Quad& q) const {
     return (flat(q[0], q[1], q[2]) || flat(q[0], q[2], q[3])) && (flat(q[0], q[1], q[3]) || flat(q[1], q[2], q[3]));
   }
-  [[nodiscard]] bool any_degenerate(const std::vector<Quad>& quads) const {
+  [[nodiscard]] bool any_degenerate(const Quads& quads) const {
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, quads.size(), 4096), false,
         [&](const auto& range, bool found) {
@@ -154,7 +154,7 @@ class Finisher {
   }
 
   /// Quads that neither diagonal saves: move a corner by a thousandth of a voxel in a random direction and look again.
-  void shake_degenerate(const std::vector<Quad>& quads) {
+  void shake_degenerate(const Quads& quads) {
     Random random(1, "surface", number_);
     for (int round = 0; round < 8 && any_degenerate(quads); ++round) {
       for (const auto& q : quads) {
@@ -205,7 +205,7 @@ class Finisher {
   std::vector<Vec3f> points_;
   std::vector<Vec3f> whole_;  // the same after a whole move, if that is another step
   std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
-  std::vector<Quad> quads_;  // of the one that waits
+  Quads quads_;  // of the one that waits
   FinishedLayer done_;
 };
 
@@ -213,13 +213,15 @@ class Finisher {
 
 struct SurfaceLayers::Impl {
   Impl(Grid g, const SurfaceParams& p, const std::optional<std::filesystem::path>& scratch)
-      : grid(g), params(p), dual(g, p.axis), keep(g.voxel_mm, p.keep_volume, p.stand_in), store(scratch) {}
+      : grid(g), params(p), keep(g.voxel_mm, p.keep_volume, p.stand_in), store(scratch) {
+    dual.emplace(g, p.axis);
+  }
 
   void push(MovableLayer&& layer) { store.push(std::move(layer)); }
 
   Grid grid;
   SurfaceParams params;
-  DualSurface dual;
+  std::optional<DualSurface> dual;  // until the last layer
   KeepVolume keep;
   LayerStore store;
   double step = 1;
@@ -236,13 +238,14 @@ void SurfaceLayers::add(const Solid& solid, const Context& context) {
 }
 
 void SurfaceLayers::add(const Solid& solid, const SampleRange& range, const Context& context) {
+  if (impl_->finished) throw Error(Code::Internal, "a surface that is finished gets no more layers");
   if (range.axis != impl_->params.axis) throw Error(Code::Internal, "slabs lie across another axis than the layers");
   context.check();
   return_free_memory();
   // The next layer is made while this one's vertices find their places.
   QuadLayer held;
   tbb::task_group behind;
-  impl_->dual.add(
+  impl_->dual->add(
       solid, range,
       [&](QuadLayer&& layer) {
         behind.wait();
@@ -262,6 +265,7 @@ void SurfaceLayers::finish(double volume_mm3) {
         volume_mm3, impl_->keep.six_volumes(), Mover(impl_->grid.voxel_mm, impl_->params.stand_in), store.size(),
         [&](std::size_t n, MovableLayer& room) -> const MovableLayer& { return store.layer(n, room); });
   }
+  impl_->dual.reset();
   impl_->finished = true;
 }
 
