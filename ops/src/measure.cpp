@@ -56,6 +56,17 @@ void split(const std::vector<Shape>& regions, const PointBlock& block, const Box
   }
 }
 
+/// The only region with a share in a block, as in most there is one; else how many regions there are.
+std::size_t only_region(const std::vector<Shape>& regions, const Box3d& box, float inverse_voxel) {
+  std::size_t only = regions.size();
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    if (regions[i].bound(box).lo * inverse_voxel >= 0.5F) continue;
+    if (only < regions.size()) return regions.size();
+    only = i;
+  }
+  return only;
+}
+
 /// Eight sums side by side, which the compiler can keep in one register.
 struct Lanes {
   std::array<float, 8> of{};
@@ -153,11 +164,12 @@ std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& 
       solid_shape.evaluate(block, s.data());
       const Vec3d low = h * Vec3d{1.0 * block.leaf->x, 1.0 * block.leaf->y, 1.0 * block.leaf->z};
       PartSums* const into = &sums[number * n];
-      if (n == 1) {
-        into[0] = one_part(b, s, block, inverse, shell);
+      const Box3d box{low, low + Vec3d{7 * h, 7 * h, 7 * h}};
+      if (const std::size_t only = n == 1 ? 0 : only_region(regions, box, inverse); only < n) {
+        into[only] = one_part(b, s, block, inverse, shell);
       } else {
         thread_local std::vector<Values> shares;
-        split(regions, block, {low, low + Vec3d{7 * h, 7 * h, 7 * h}}, inverse, shares);
+        split(regions, block, box, inverse, shares);
         add_parts(b, s, shares, block, inverse, shell, into);
       }
       for (std::size_t r = 0; r < n; ++r) into[r] = rounded(into[r]);
