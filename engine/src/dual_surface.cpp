@@ -13,6 +13,7 @@
 #include <numeric>
 #include <utility>
 
+#include "fibrolite/clones.h"
 #include "fibrolite/error.h"
 #include "leaf_bits.h"
 #include "vdb_access.h"
@@ -175,8 +176,7 @@ struct Samples {
   }
 };
 
-[[gnu::target_clones("avx2", "default")]] void rows_inside(const std::array<float, 9 * 9 * 9>& value,
-                                                           std::array<std::uint16_t, 81>& bits) {
+FIBROLITE_CLONES void rows_inside(const std::array<float, 9 * 9 * 9>& value, std::array<std::uint16_t, 81>& bits) {
   std::array<std::uint8_t, 9 * 9 * 9> inside;
   for (std::size_t i = 0; i < inside.size(); ++i) inside[i] = value[i] < 0 ? 1 : 0;
   for (std::size_t row = 0; row < 81; ++row) {

@@ -4,11 +4,13 @@
 #include <bit>
 #include <cstring>
 
+#include "fibrolite/clones.h"
+
 namespace fibrolite {
 
 static_assert(std::endian::native == std::endian::little);
 
-[[gnu::target_clones("avx2", "default")]] LeafBits bits_below(const float* value, float below) {
+FIBROLITE_CLONES LeafBits bits_below(const float* value, float below) {
   LeafBits bits{};
   for (std::size_t x = 0; x < 8; ++x) {
     std::array<std::uint8_t, 64> less;

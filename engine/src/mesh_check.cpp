@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "fibrolite/clones.h"
 #include "fibrolite/error.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/mesh_layers.h"
@@ -105,12 +106,10 @@ template <int lanes>
   for (std::uint32_t i = 0; i < count; ++i) one &= found[i] == 1;
   return one;
 }
-[[gnu::target_clones("avx2", "default")]] bool match_8(const Fan& fan, std::uint32_t count,
-                                                       std::array<std::uint32_t, most_in_fan>& next) {
+FIBROLITE_CLONES bool match_8(const Fan& fan, std::uint32_t count, std::array<std::uint32_t, most_in_fan>& next) {
   return match<8>(fan, count, next);
 }
-[[gnu::target_clones("avx2", "default")]] bool match_16(const Fan& fan, std::uint32_t count,
-                                                        std::array<std::uint32_t, most_in_fan>& next) {
+FIBROLITE_CLONES bool match_16(const Fan& fan, std::uint32_t count, std::array<std::uint32_t, most_in_fan>& next) {
   return match<16>(fan, count, next);
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "fibrolite/blocks.h"
+#include "fibrolite/clones.h"
 #include "fibrolite/error.h"
 #include "leaf_bits.h"
 #include "vdb_access.h"
@@ -24,8 +25,7 @@ using Leaf = Tree::LeafNodeType;
 
 /// Moves values off the surface by `nudge` and limits them to what the grid tells; `depth` gets how far off it they
 /// are.
-[[gnu::target_clones("avx2", "default")]] void keep_in_band(float* values, float* depth, float nudge, float deepest,
-                                                            float highest) {
+FIBROLITE_CLONES void keep_in_band(float* values, float* depth, float nudge, float deepest, float highest) {
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
     const float v = values[i], off = v < 0 ? -nudge : nudge;
     depth[i] = std::abs(v);

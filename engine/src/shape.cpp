@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "fibrolite/clones.h"
+
 namespace fibrolite {
 namespace {
 
@@ -165,7 +167,7 @@ Shape make(Args&&... args) {
 }  // namespace
 
 /// Eight side by side, for the compiler.
-[[gnu::target_clones("avx2", "default")]] Interval range_of(const float* v, int count) {
+FIBROLITE_CLONES Interval range_of(const float* v, int count) {
   std::array<float, 8> low, high;
   low.fill(v[0]);
   high.fill(v[0]);

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "fibrolite/clones.h"
 #include "fibrolite/slice.h"
 #include "vdb_access.h"
 
@@ -24,7 +25,7 @@ Weights catmull_rom(float t) {
 }
 
 /// The cell of each coordinate, voxels.
-[[gnu::target_clones("avx2", "default")]] void cells_of(const float* mm, int count, double scale, int* cell) {
+FIBROLITE_CLONES void cells_of(const float* mm, int count, double scale, int* cell) {
   for (int k = 0; k < count; ++k) {
     const double v = static_cast<double>(mm[k]) * scale;
     const int toward_zero = static_cast<int>(v);

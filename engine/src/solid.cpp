@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "fibrolite/blocks.h"
+#include "fibrolite/clones.h"
 #include "fibrolite/error.h"
 #include "fibrolite/vdb.h"
 #include "vdb_access.h"
@@ -125,7 +126,7 @@ struct Padded {
 /// Filled part of a leaf, voxels. A sample counts with clamp(1/2 - m, 0, 1), m the mean distance over its voxel: the
 /// distance at the sample plus 1/24 of the Laplacian, which takes the error of curved surfaces from second to fourth
 /// order.
-[[gnu::target_clones("avx2", "default")]] double filled(const Padded& p, float inverse) {
+FIBROLITE_CLONES double filled(const Padded& p, float inverse) {
   // A row side by side: written as vectors, as the compiler makes branches of the comparisons.
   using Lanes [[gnu::vector_size(32)]] = float;
   constexpr int dx = Padded::stride[0], dy = Padded::stride[1];

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "band_check.h"
+#include "fibrolite/clones.h"
 #include "leaf_bits.h"
 #include "triangle_cells.h"
 #include "triangle_kernel.h"
@@ -50,8 +51,8 @@ Coord cells_to_samples(int x, int y, int z) { return {x * cell_size, y * cell_si
 enum Side : int { Inside = -1, Crossed = 0, Outside = 1 };
 
 /// A leaf's values, in voxels and as they are stored.
-[[gnu::target_clones("avx2", "default")]] void keep_in_band(const float* values, float lowest, float highest,
-                                                            float voxel, float* kept, float* stored) {
+FIBROLITE_CLONES void keep_in_band(const float* values, float lowest, float highest, float voxel, float* kept,
+                                   float* stored) {
   for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
     const float some = values[i] < lowest ? lowest : values[i], v = highest < some ? highest : some;
     const float off = std::copysign(nudge_vox, v);

@@ -9,6 +9,8 @@
 #include <memory>
 #include <numbers>
 
+#include "fibrolite/clones.h"
+
 namespace fibrolite {
 namespace {
 
@@ -150,13 +152,12 @@ template <Surface surface>
   }
 }
 
-[[gnu::target_clones("avx2", "default")]] void look_up_d(const float* px, const float* py, const float* pz, int count,
-                                                         Vec3f s, Vec3f per, const float* table, float* out) {
+FIBROLITE_CLONES void look_up_d(const float* px, const float* py, const float* pz, int count, Vec3f s, Vec3f per,
+                                const float* table, float* out) {
   look_up<Surface::D>(px, py, pz, count, s.x, s.y, s.z, per.x, per.y, per.z, table, out);
 }
-[[gnu::target_clones("avx2", "default")]] void look_up_gyroid(const float* px, const float* py, const float* pz,
-                                                              int count, Vec3f s, Vec3f per, const float* table,
-                                                              float* out) {
+FIBROLITE_CLONES void look_up_gyroid(const float* px, const float* py, const float* pz, int count, Vec3f s, Vec3f per,
+                                     const float* table, float* out) {
   look_up<Surface::Gyroid>(px, py, pz, count, s.x, s.y, s.z, per.x, per.y, per.z, table, out);
 }
 

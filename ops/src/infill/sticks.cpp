@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "fibrolite/clones.h"
+
 namespace fibrolite {
 namespace {
 
@@ -168,21 +170,20 @@ struct Crystal final : Lattice {
     }
   }
 
-  [[gnu::target_clones("avx2", "default")]] static void cubic(const PointBlock& block, Vec3f shift, float quarter,
-                                                              float k, float stick, float ball, float* out) {
+  FIBROLITE_CLONES static void cubic(const PointBlock& block, Vec3f shift, float quarter, float k, float stick,
+                                     float ball, float* out) {
     joined_by(Cubic{}, block, shift, quarter, k, stick, ball, out);
   }
-  [[gnu::target_clones("avx2", "default")]] static void stretched(const PointBlock& block, Vec3f shift, float quarter,
-                                                                  float k, float stick, float ball, float* out) {
+  FIBROLITE_CLONES static void stretched(const PointBlock& block, Vec3f shift, float quarter, float k, float stick,
+                                         float ball, float* out) {
     joined_by(Stretched{k}, block, shift, quarter, k, stick, ball, out);
   }
-  [[gnu::target_clones("avx2", "default")]] static void cubic_apart(const PointBlock& block, Vec3f shift, float quarter,
-                                                                    float k, float* bond, float* node) {
+  FIBROLITE_CLONES static void cubic_apart(const PointBlock& block, Vec3f shift, float quarter, float k, float* bond,
+                                           float* node) {
     apart_by(Cubic{}, block, shift, quarter, k, bond, node);
   }
-  [[gnu::target_clones("avx2", "default")]] static void stretched_apart(const PointBlock& block, Vec3f shift,
-                                                                        float quarter, float k, float* bond,
-                                                                        float* node) {
+  FIBROLITE_CLONES static void stretched_apart(const PointBlock& block, Vec3f shift, float quarter, float k,
+                                               float* bond, float* node) {
     apart_by(Stretched{k}, block, shift, quarter, k, bond, node);
   }
 
@@ -238,8 +239,8 @@ struct AnyCell final : Lattice {
       }
     }
   };
-  [[gnu::target_clones("avx2", "default")]] static void run(const PointBlock& block, Vec3f shift,
-                                                            const Nearest& nearest, float* bond, float* node) {
+  FIBROLITE_CLONES static void run(const PointBlock& block, Vec3f shift, const Nearest& nearest, float* bond,
+                                   float* node) {
     const Vec3f& q = nearest.edges;
     each_eight(block, shift, {1 / q.x, 1 / q.y, 1 / q.z}, nearest, bond, node);
     take_roots(block.count, 1, bond);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "fibrolite/box.h"
+#include "fibrolite/clones.h"
 
 namespace fibrolite {
 namespace {
@@ -50,8 +51,8 @@ std::vector<Frame> rotation_minimising(const std::vector<Vec3d>& p, bool closed)
   return frames;
 }
 
-[[gnu::target_clones("avx2", "default")]] void take_where(const int* __restrict number, int wanted, int count,
-                                                          const float* __restrict from, float* __restrict to) {
+FIBROLITE_CLONES void take_where(const int* __restrict number, int wanted, int count, const float* __restrict from,
+                                 float* __restrict to) {
   for (int i = 0; i < count; ++i) to[i] = number[i] == wanted ? from[i] : to[i];
 }
 
@@ -139,11 +140,9 @@ bool Sweep::in_slab(int slab, Vec3d p) const {
 }
 
 // The optimizer takes these loops apart only if it knows that answers overlap no points, and asks for no calls inside.
-[[gnu::target_clones("avx2", "default")]] void Sweep::map_straight(const Plane& plane, float from,
-                                                                   const float* __restrict x, const float* __restrict y,
-                                                                   const float* __restrict z, int count,
-                                                                   float* __restrict u, float* __restrict v,
-                                                                   float* __restrict along) {
+FIBROLITE_CLONES void Sweep::map_straight(const Plane& plane, float from, const float* __restrict x,
+                                          const float* __restrict y, const float* __restrict z, int count,
+                                          float* __restrict u, float* __restrict v, float* __restrict along) {
   const Plane a = plane;
   for (int i = 0; i < count; ++i) {
     const float dx = x[i] - a.cx, dy = y[i] - a.cy, dz = z[i] - a.cz;
@@ -153,11 +152,10 @@ bool Sweep::in_slab(int slab, Vec3d p) const {
   }
 }
 
-[[gnu::target_clones("avx2", "default")]] void Sweep::map_between(const Plane& start, const Plane& end,
-                                                                  const Stretch& stretch, const float* __restrict x,
-                                                                  const float* __restrict y, const float* __restrict z,
-                                                                  int count, float* __restrict u, float* __restrict v,
-                                                                  float* __restrict along) {
+FIBROLITE_CLONES void Sweep::map_between(const Plane& start, const Plane& end, const Stretch& stretch,
+                                         const float* __restrict x, const float* __restrict y,
+                                         const float* __restrict z, int count, float* __restrict u, float* __restrict v,
+                                         float* __restrict along) {
   const Plane a = start, b = end;
   const Stretch over = stretch;
   for (int i = 0; i < count; ++i) {
@@ -178,9 +176,8 @@ bool Sweep::in_slab(int slab, Vec3d p) const {
   }
 }
 
-[[gnu::target_clones("avx2", "default")]] void Sweep::count_passed(const Plane& plane, const float* __restrict x,
-                                                                   const float* __restrict y, const float* __restrict z,
-                                                                   int count, int* __restrict passed) {
+FIBROLITE_CLONES void Sweep::count_passed(const Plane& plane, const float* __restrict x, const float* __restrict y,
+                                          const float* __restrict z, int count, int* __restrict passed) {
   const Plane p = plane;
   for (int i = 0; i < count; ++i)
     passed[i] += (x[i] - p.cx) * p.tx + (y[i] - p.cy) * p.ty + (z[i] - p.cz) * p.tz >= 0 ? 1 : 0;
