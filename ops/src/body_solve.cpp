@@ -25,21 +25,35 @@ void check_params(const VerifyParams& p) {
   require(norm(p.up) > 0 && std::isfinite(norm(p.up)), "up", "a direction");
 }
 
+namespace {
+
+std::vector<std::vector<fem::Stress>> nodal(const SolvedMesh& model, const Material& material) {
+  std::vector<std::vector<fem::Stress>> result;
+  for (const fem::Solution& s : model.solutions)
+    result.push_back(fem::nodal_stress(model.mesh, material, s.displacement_mm));
+  return result;
+}
+
+}  // namespace
+
+SolvedBody::SolvedBody(SolvedMesh solved, LoadedSetting loaded)
+    : setting(std::move(loaded)),
+      model(std::move(solved)),
+      nodal_stress(nodal(model, setting.material)),
+      locator(model.mesh) {}
+
 double SolvedBody::von_mises_mpa(Vec3d p) const {
-  const std::uint32_t tet = locator.find(p).tet;
   double most = 0;
-  for (const fem::Solution& s : model.solutions) most = std::max(most, von_mises(s.centroid_stress[tet]));
+  each_stress(p, [&](const fem::Stress& s) { most = std::max(most, von_mises(s)); });
   return most;
 }
 
 double SolvedBody::traction_mpa(Vec3d p, Vec3d n) const {
-  const std::uint32_t tet = locator.find(p).tet;
   double most = 0;
-  for (const fem::Solution& s : model.solutions) {
-    const fem::Stress& t = s.centroid_stress[tet];
+  each_stress(p, [&](const fem::Stress& t) {
     most = std::max(most, norm(Vec3d{t[0] * n.x + t[3] * n.y + t[5] * n.z, t[3] * n.x + t[1] * n.y + t[4] * n.z,
                                      t[5] * n.x + t[4] * n.y + t[2] * n.z}));
-  }
+  });
   return most;
 }
 

@@ -29,11 +29,22 @@ struct SolvedMesh {
 
 /// The solved body and the way to a place in it.
 struct SolvedBody {
-  SolvedBody(SolvedMesh solved, LoadedSetting loaded)
-      : setting(std::move(loaded)), model(std::move(solved)), locator(model.mesh) {}
+  SolvedBody(SolvedMesh solved, LoadedSetting loaded);
   SolvedBody(const SolvedBody&) = delete;
   SolvedBody& operator=(const SolvedBody&) = delete;
 
+  /// Calls visit(stress) for each load case with its stress at a point, MPa: that at the nodes, linear between them.
+  template <class Visit>
+  void each_stress(Vec3d p, const Visit& visit) const {
+    const fem::Locator::Place at = locator.find(p);
+    const auto& corners = model.mesh.tets[at.tet];
+    for (const auto& nodal : nodal_stress) {
+      fem::Stress stress{};
+      for (std::size_t k = 0; k < 4; ++k)
+        for (std::size_t c = 0; c < stress.size(); ++c) stress[c] += at.barycentric[k] * nodal[corners[k]][c];
+      visit(stress);
+    }
+  }
   /// As Verification::traction_mpa.
   [[nodiscard]] double traction_mpa(Vec3d p, Vec3d n) const;
   /// As Verification::von_mises_mpa.
@@ -41,6 +52,7 @@ struct SolvedBody {
 
   const LoadedSetting setting;
   const SolvedMesh model;
+  const std::vector<std::vector<fem::Stress>> nodal_stress;  // [load case][node]
   const fem::Locator locator;
 };
 

@@ -2,6 +2,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Surface_mesh.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_filter.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_cost.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
@@ -133,15 +134,21 @@ class BoundedPlacement {
 };
 
 /// Edge collapse that keeps the volume (Lindstrom and Turk 1998); no vertex goes farther than `bound_mm` from the
-/// surface.
+/// surface, and no triangle turns over.
 Mesh simplified(const Mesh& mesh, const Solid& solid, int triangles, double bound_mm, const Context& context) {
+  using Cost = sms::LindstromTurk_cost<CgalMesh>;
+  // On a flat face volume alone makes every collapse free: all but a handful of its triangles would go, those that
+  // rounding chose, and whatever presses on a patch of it would act on a mesh as coarse as the patch. The paper's term
+  // for the shape of triangles parts them; where the surface bends by more than a fortieth of an edge, volume decides.
+  constexpr double shape_weight = 1e-5;
   CgalMesh fine = to_cgal(mesh);
   context.check();
   const auto edges = static_cast<std::size_t>(triangles) * 3 / 2;
   if (fine.number_of_edges() > edges) {
     sms::edge_collapse(fine, sms::Count_stop_predicate<CgalMesh>(edges),
-                       CGAL::parameters::get_cost(sms::LindstromTurk_cost<CgalMesh>())
-                           .get_placement(BoundedPlacement(solid, bound_mm)));
+                       CGAL::parameters::get_cost(Cost(Cost::LindstromTurk_params(0.5, 0.5, shape_weight)))
+                           .get_placement(BoundedPlacement(solid, bound_mm))
+                           .filter(sms::Bounded_normal_change_filter<>()));
   }
   context.check();
   // Judged at the floats that go on, not at the doubles they came from.

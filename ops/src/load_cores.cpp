@@ -34,46 +34,25 @@ struct Flow {
   double along = 0, across = 0;  // roots of the two largest eigenvalues of S, MPa
 };
 
-class Stresses {
- public:
-  Stresses(const SolvedBody& body, const Material& material) : body_(body) {
-    for (const fem::Solution& s : body.model.solutions)
-      nodal_.push_back(fem::nodal_stress(body.model.mesh, material, s.displacement_mm));
-  }
-  [[nodiscard]] Flow flow(Vec3d p) const {
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    each(p, [&](const fem::Stress& s) {
-      Eigen::Matrix3d m;
-      m << s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2];
-      sum += m * m;
-    });
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum);
-    const Eigen::Vector3d v = solver.eigenvectors().col(2);
-    const auto root = [&](int i) { return std::sqrt(std::max(solver.eigenvalues()[i], 0.0)); };
-    return {{v[0], v[1], v[2]}, root(2), root(1)};
-  }
-  /// Normal stress along a unit vector, root of the sum of squares over the load cases.
-  [[nodiscard]] double along(Vec3d p, Vec3d axis) const {
-    double sum = 0;
-    each(p, [&](const fem::Stress& s) { sum += std::pow(fem::normal_stress(s, axis), 2); });
-    return std::sqrt(sum);
-  }
+Flow flow(const SolvedBody& body, Vec3d p) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  body.each_stress(p, [&](const fem::Stress& s) {
+    Eigen::Matrix3d m;
+    m << s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2];
+    sum += m * m;
+  });
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(sum);
+  const Eigen::Vector3d v = solver.eigenvectors().col(2);
+  const auto root = [&](int i) { return std::sqrt(std::max(solver.eigenvalues()[i], 0.0)); };
+  return {{v[0], v[1], v[2]}, root(2), root(1)};
+}
 
- private:
-  template <class Visit>
-  void each(Vec3d p, const Visit& visit) const {
-    const fem::Locator::Place at = body_.locator.find(p);
-    const auto& corners = body_.model.mesh.tets[at.tet];
-    for (const auto& nodal : nodal_) {
-      fem::Stress stress{};
-      for (std::size_t k = 0; k < 4; ++k)
-        for (std::size_t c = 0; c < stress.size(); ++c) stress[c] += at.barycentric[k] * nodal[corners[k]][c];
-      visit(stress);
-    }
-  }
-  const SolvedBody& body_;
-  std::vector<std::vector<fem::Stress>> nodal_;  // [load case][node]
-};
+/// Normal stress along a unit vector, root of the sum of squares over the load cases, MPa.
+double stress_along(const SolvedBody& body, Vec3d p, Vec3d axis) {
+  double sum = 0;
+  body.each_stress(p, [&](const fem::Stress& s) { sum += std::pow(fem::normal_stress(s, axis), 2); });
+  return std::sqrt(sum);
+}
 
 /// Samples of the body on a lattice about its middle.
 struct Samples {
@@ -103,7 +82,7 @@ struct Samples {
   [[nodiscard]] std::size_t height() const { return static_cast<std::size_t>(size[1]); }
 };
 
-Samples sample(const Proxy& proxy, const Partition& partition, const Stresses& stresses) {
+Samples sample(const Proxy& proxy, const Partition& partition, const SolvedBody& body) {
   const Box3d box = proxy.solid.bounds_mm();
   Samples s;
   s.step_mm = std::cbrt(proxy.solid.volume_mm3() / samples_inside);
@@ -120,7 +99,7 @@ Samples sample(const Proxy& proxy, const Partition& partition, const Stresses& s
   for (std::size_t at = 0; at < all; ++at) {
     const Vec3d p = s.place(at);
     if (proxy.solid.distance(p) >= 0) continue;
-    s.flow[at] = stresses.flow(p);
+    s.flow[at] = flow(body, p);
     s.mean += s.flow[at].along;
     ++count;
     const int label = partition.labels.label(p);
@@ -232,7 +211,7 @@ struct Waist {
   double force_n = 0;     // integral of the magnitude of the stress along the axis over the host's section
 };
 
-Waist waist_of(const Stresses& stresses, const Samples& samples, const Stream& stream, const Frame& frame,
+Waist waist_of(const SolvedBody& body, const Samples& samples, const Stream& stream, const Frame& frame,
                std::pair<double, double> chord) {
   // Slabs five samples thick about each place, so that one ill-shaped tetrahedron decides nothing.
   constexpr std::size_t beside = 2;  // slabs on either side
@@ -247,7 +226,7 @@ Waist waist_of(const Stresses& stresses, const Samples& samples, const Stream& s
     const Vec3d p = samples.place(at), local = frame.to_local(p);
     const auto k = static_cast<std::ptrdiff_t>(std::floor((local.z - chord.first) / h));
     if (k < 0 || k >= static_cast<std::ptrdiff_t>(slabs.size())) continue;
-    const double stress = stresses.along(p, frame.z);
+    const double stress = stress_along(body, p, frame.z);
     Slab& slab = slabs[static_cast<std::size_t>(k)];
     slab.all += stress;
     if (std::hypot(local.x, local.y) > around * h) continue;
@@ -274,7 +253,7 @@ struct Found {
   std::string why_not;
 };
 
-Found measure(const Proxy& proxy, const Partition& partition, const Stresses& stresses, const Samples& samples,
+Found measure(const Proxy& proxy, const Partition& partition, const SolvedBody& body, const Samples& samples,
               const Stream& stream, const CoreParams& params, double dominance) {
   Found found;
   const double voxel = proxy.solid.grid().voxel_mm;
@@ -285,7 +264,7 @@ Found measure(const Proxy& proxy, const Partition& partition, const Stresses& st
   }
   const Frame frame = frame_along(stream.centre, stream.axis);
   const double length = through->second - through->first;
-  const Waist waist = waist_of(stresses, samples, stream, frame, *through);
+  const Waist waist = waist_of(body, samples, stream, frame, *through);
   double radius = std::sqrt(params.share * waist.force_n / (std::numbers::pi * std::max(waist.stress_mpa, 1e-12)));
   const bool widened = radius < 0.5 * params.least_mm;
   radius = std::max(radius, 0.5 * params.least_mm);
@@ -420,13 +399,12 @@ Partition find_cores(const Proxy& proxy, Partition partition, const CoreParams& 
   TetMesh mesh = body_mesh(proxy, loads.triangles, notes, context.part(0, 0.4, "cores"));
   const auto body =
       solve_body(proxy, std::move(mesh), partition.labels, loads, material, context.part(0.4, 0.7, "cores"));
-  const Stresses stresses(*body, material);
-  const Samples samples = sample(proxy, partition, stresses);
+  const Samples samples = sample(proxy, partition, *body);
   context.check();
 
   std::vector<Core> cores;
   for (const Stream& stream : streams(samples, loads.dominance, params.concentration, context)) {
-    Found found = measure(proxy, partition, stresses, samples, stream, params, loads.dominance);
+    Found found = measure(proxy, partition, *body, samples, stream, params, loads.dominance);
     const bool crosses = found.why_not.empty() && std::any_of(cores.begin(), cores.end(), [&](const Core& other) {
                            return gap(found.core, other) < 0.25 * params.least_mm;
                          });

@@ -237,20 +237,21 @@ void make_parts(Verification& result, const Proxy& proxy, const Partition& parti
 }
 
 /// What was solved for the whole body, with everything that a reader of files wants to know.
-StressField stress_field(const SolvedMesh& body, const LoadedSetting& setting, const Labels& labels) {
+StressField stress_field(const SolvedBody& whole, const Labels& labels) {
+  const SolvedMesh& body = whole.model;
+  const LoadedSetting& setting = whole.setting;
   StressField field{body.mesh, {}, setting.material, {}, {}};
   for (const auto& n : body.mesh.tets)
     field.part.push_back(labels.label(
         0.25 * (body.mesh.nodes[n[0]] + body.mesh.nodes[n[1]] + body.mesh.nodes[n[2]] + body.mesh.nodes[n[3]])));
   for (std::size_t c = 0; c < body.solutions.size(); ++c) {
-    const std::vector<Vec3d>& displacement = body.solutions[c].displacement_mm;
     StressField::Case& solved = field.cases.emplace_back();
     solved.name = setting.cases[c].name;
     solved.held_in = body.cases[c].frame;
     for (const fem::Fixed& f : body.cases[c].fixed) solved.fixed.push_back({f.node, f.axis});
     solved.force_n = body.cases[c].load.force_n;
-    solved.displacement_mm = displacement;
-    solved.stress_mpa = fem::nodal_stress(body.mesh, setting.material, displacement);
+    solved.displacement_mm = body.solutions[c].displacement_mm;
+    solved.stress_mpa = whole.nodal_stress[c];
   }
   return field;
 }
@@ -363,7 +364,7 @@ Verification verify(const Proxy& proxy, const Partition& partition, const Verify
   }
   make_parts(result, proxy, partition, verdicts);
   if (params.keep_field) {
-    result.field = stress_field(body, setting, result.parts.labels);
+    result.field = stress_field(*whole, result.parts.labels);
     result.field.frame = proxy.frame;
   }
   context.progress(1);

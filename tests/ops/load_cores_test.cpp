@@ -117,6 +117,24 @@ TEST(LoadCores, TurnedModelAndLoadGiveTheTurnedCore) {
   EXPECT_NEAR(ca.diameter_mm, cb.diameter_mm, 0.15 * ca.diameter_mm);
 }
 
+/// Turned and shifted by a hair, the body has the same surface to some hundredths of a voxel, in other triangles.
+TEST(LoadCores, AHairsBreadthDecidesNothing) {
+  constexpr double hair = 0.02 * 0.8;  // mm
+  const double expected = std::sqrt(4 / std::numbers::pi * 0.7 * patch * patch);
+  for (std::uint64_t turn = 0; turn < 4; ++turn) {
+    Random random(1, "hair", turn);
+    const auto some = [&](double range) { return range * (2 * random.uniform() - 1); };
+    const Frame frame = frame_along({some(hair), some(hair), some(hair)}, {some(hair / side), some(hair / side), 1});
+    SCOPED_TRACE(turn);
+    const Partition found = cores_of(box(frame), loaded({on_top()}));
+    ASSERT_EQ(found.cores.size(), 1U) << (found.notes.empty() ? "" : found.notes.front());
+    const Candidate& c = found.candidates[1];
+    EXPECT_LT(degrees(found.cores.front().frame.z, {0, 0, 1}), 3);
+    EXPECT_LT(std::hypot(c.centroid_mm.x, c.centroid_mm.y), 1.5);
+    EXPECT_NEAR(c.diameter_mm, expected, 0.15 * expected);
+  }
+}
+
 TEST(LoadCores, CasesThatDisagreeHaveNoCore) {
   // Whatever is proposed, no part is a column under both.
   const Proxy proxy = box();

@@ -271,6 +271,23 @@ TEST(Extract, IslandsGoCavitiesStay) {
   for (const Vec3d& p : mesh.nodes) EXPECT_LT(p.x, 12);
 }
 
+/// What presses on a patch of a face acts on its triangles: a face that is flat to the last bit keeps its share of
+/// them, however often the body's edges are bent.
+TEST(Extract, FlatFacesKeepTheirTriangles) {
+  constexpr double side = 40, turned = 4e-4;
+  constexpr int most = 3000;
+  const Shape body = placed(offset(cuboid({{-17, -17, -17}, {17, 17, 17}}), 3), frame_along({}, {turned, -turned, 1}));
+  const Proxy proxy = proxy_of(body, Box3d{{-24, -24, -24}, {24, 24, 24}}, 0.8);
+  const TetMesh mesh = extract(proxy, everything(), {.max_surface_triangles = most});
+  double longest = 0;
+  for (const TetFace& face : boundary(mesh))
+    for (std::size_t k = 0; k < 3; ++k)
+      longest = std::max(longest, norm(mesh.nodes[face.nodes[k]] - mesh.nodes[face.nodes[(k + 1) % 3]]));
+  // Were all of them alike and equilateral.
+  const double even = std::sqrt(4 / std::sqrt(3.0) * 6 * side * side / most);
+  EXPECT_LT(longest, 5 * even);
+}
+
 TEST(Extract, NothingToExtractIsSaid) {
   const Proxy proxy = proxy_of(sphere({0, 0, 0}, 8), Box3d{{-10, -10, -10}, {10, 10, 10}}, 0.8);
   try {

@@ -154,6 +154,11 @@ TEST(Verify, StressOfAPressedPostIsForceOverArea) {
   const double inertia = std::numbers::pi * 8 * 8 * 8 * 8 / 4;
   // On either side of the post; its tetrahedra are as coarse as its radius, so both sides together.
   EXPECT_NEAR(0.5 * (traction(6) + traction(-6)) / (slanting * 30 * 6 / inertia), 1, 0.1);
+  // And all across: linear, not by steps as large as a tetrahedron. The load comes from x: that side is pulled.
+  for (const double x : {-6.0, -4.5, -3.0, 3.0, 4.5, 6.0}) {
+    const double beam = slanting * 30 * x / inertia - slanting / area;
+    EXPECT_NEAR(traction(x) / std::abs(beam), 1, 0.1) << "at " << x;
+  }
 }
 
 TEST(Verify, ACylinderWithoutLoadIsBulk) {

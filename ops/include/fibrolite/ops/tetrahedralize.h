@@ -32,10 +32,10 @@ struct ExtractParams {
   int max_surface_triangles = 6000;  ///< Aim of the simplification.
   double max_distance_vox = 0.5;     ///< Bound of the simplification, voxels.
 };
-/// One component as tetrahedra: realize max(body, region), surface, simplify within a bound, check, tetrahedralize;
-/// when that fails, again with a coarser surface, and once more with one that is not simplified. The shell that
-/// encloses most is kept, with its cavities of 27 voxels or more; loose islands are dropped. @throws Error
-/// SolverFailed, BadRecipe, Cancelled.
+/// One component as tetrahedra: realize max(body, region), surface, simplify within a bound (flat faces keep their
+/// share of the triangles, for load may act on a patch of one), check, tetrahedralize; when that fails, again with a
+/// coarser surface, and once more with one that is not simplified. The shell that encloses most is kept, with its
+/// cavities of 27 voxels or more; loose islands are dropped. @throws Error SolverFailed, BadRecipe, Cancelled.
 [[nodiscard]] TetMesh extract(const Proxy& proxy, const Shape& region, const ExtractParams& params = {},
                               const Context& context = {});
 

@@ -49,7 +49,8 @@ struct Verification {
   std::vector<Selected> selected;  ///< What each support and force of each load case got hold of.
   std::vector<std::string> notes;
   /// Length of the traction, MPa, on the plane through a point of the body with a unit normal, in the load case where
-  /// it is largest; from the solve of the whole body, taken as solid. Thread-safe.
+  /// it is largest; from the solve of the whole body, taken as solid: its stress at the nodes, linear between them.
+  /// Thread-safe.
   std::function<double(Vec3d point_mm, Vec3d normal)> traction_mpa;
   /// Von Mises stress there, MPa, of the load case where it is largest; otherwise the same.
   std::function<double(Vec3d point_mm)> von_mises_mpa;
