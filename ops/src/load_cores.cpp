@@ -207,43 +207,45 @@ void each_on_ring(const Frame& section, double radius, const Visit& visit) {
 
 /// Where along its axis a core is stressed most, and what runs through the section there.
 struct Waist {
-  double stress_mpa = 0;  // along the axis, mean within three samples of it
+  double stress_mpa = 0;  // along the axis, weighted mean within three samples of it
   double force_n = 0;     // integral of the magnitude of the stress along the axis over the host's section
 };
 
 Waist waist_of(const SolvedBody& body, const Samples& samples, const Stream& stream, const Frame& frame,
                std::pair<double, double> chord) {
-  // Slabs five samples thick about each place, so that one ill-shaped tetrahedron decides nothing.
-  constexpr std::size_t beside = 2;  // slabs on either side
-  constexpr double around = 3;       // samples
-  const double h = samples.step_mm;
-  struct Slab {
-    double near = 0, near_count = 0, all = 0;
+  // Means over a stretch on either side of each place, so that one ill-shaped tetrahedron decides nothing. Weights fall
+  // to nothing at its ends: they sum to the same wherever the samples' layers lie, where a slab would hold a layer more
+  // or less. No stretch reaches beyond the body.
+  constexpr int beside = 2;     // samples on either side
+  constexpr double around = 3;  // samples
+  const double h = samples.step_mm, reach = beside * h;
+  const double low = chord.first + reach, room = chord.second - reach - low;
+  if (!(room > 0)) return {};
+  struct Place {
+    double near = 0, near_weight = 0, all = 0;
   };
-  std::vector<Slab> slabs(static_cast<std::size_t>((chord.second - chord.first) / h) + 1);
+  std::vector<Place> places(static_cast<std::size_t>(std::ceil(room / h)) + 1);
+  const double apart = room / static_cast<double>(places.size() - 1);
   for (std::size_t at = 0; at < samples.flow.size(); ++at) {
     if (samples.host[at] != stream.host) continue;
     const Vec3d p = samples.place(at), local = frame.to_local(p);
-    const auto k = static_cast<std::ptrdiff_t>(std::floor((local.z - chord.first) / h));
-    if (k < 0 || k >= static_cast<std::ptrdiff_t>(slabs.size())) continue;
+    if (local.z <= chord.first || local.z >= chord.second) continue;
     const double stress = stress_along(body, p, frame.z);
-    Slab& slab = slabs[static_cast<std::size_t>(k)];
-    slab.all += stress;
-    if (std::hypot(local.x, local.y) > around * h) continue;
-    slab.near += stress;
-    ++slab.near_count;
+    const bool near = std::hypot(local.x, local.y) <= around * h;
+    const double first = std::max(std::ceil((local.z - reach - low) / apart), 0.0);
+    for (auto k = static_cast<std::size_t>(first); k < places.size(); ++k) {
+      const double weight = (1 - std::abs(low + apart * static_cast<double>(k) - local.z) / reach) / beside;
+      if (weight <= 0) break;
+      places[k].all += weight * stress;
+      if (!near) continue;
+      places[k].near += weight * stress;
+      places[k].near_weight += weight;
+    }
   }
   Waist waist;
-  for (std::size_t k = beside; k + beside < slabs.size(); ++k) {
-    Slab sum;
-    for (std::size_t i = k - beside; i <= k + beside; ++i) {
-      sum.near += slabs[i].near;
-      sum.near_count += slabs[i].near_count;
-      sum.all += slabs[i].all;
-    }
-    if (!(sum.near_count > 0) || sum.near / sum.near_count <= waist.stress_mpa) continue;
-    waist = {sum.near / sum.near_count, sum.all * h * h / (2 * beside + 1)};
-  }
+  for (const Place& place : places)
+    if (place.near_weight > 0 && place.near / place.near_weight > waist.stress_mpa)
+      waist = {place.near / place.near_weight, place.all * h * h};
   return waist;
 }
 

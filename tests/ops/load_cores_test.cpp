@@ -135,6 +135,20 @@ TEST(LoadCores, AHairsBreadthDecidesNothing) {
   }
 }
 
+/// Samples lie on a lattice, whose layers meet the ends of a box of another height elsewhere.
+TEST(LoadCores, ACoreIsAsWideWhereverTheSamplesLie) {
+  double least = far_mm, most = 0;
+  for (int more = 0; more < 6; ++more) {
+    const double height = side + 0.3 * more;
+    const LoadCase top = pressed("top", {}, {0, 0, height}, {0, 0, -1}, {0, 0, -1});
+    const Partition found = cores_of(box({}, {side, side, height}), loaded({top}));
+    ASSERT_EQ(found.cores.size(), 1U) << height;
+    least = std::min(least, found.candidates[1].diameter_mm);
+    most = std::max(most, found.candidates[1].diameter_mm);
+  }
+  EXPECT_LT(most, 1.05 * least) << least << " to " << most;
+}
+
 TEST(LoadCores, CasesThatDisagreeHaveNoCore) {
   // Whatever is proposed, no part is a column under both.
   const Proxy proxy = box();
