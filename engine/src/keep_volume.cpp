@@ -10,6 +10,8 @@
 #include <functional>
 #include <utility>
 
+#include "quad_envelope.h"
+
 namespace fibrolite {
 namespace {
 
@@ -220,6 +222,10 @@ double step_for_volume(double wanted_mm3, double six_volumes, const Mover& mover
         }
       });
     }
+    const auto diagonal = [&](const std::array<Vec3d, 4>& p) {
+      const std::size_t first = shorter(p);
+      return !mover.free() && wrong_diagonal(p, mover.voxel_mm(), first == 0) ? 1 - first : first;
+    };
     const auto corners = [&](const Quad& q, std::size_t s) {
       std::array<Vec3d, 4> p;
       for (std::size_t k = 0; k < 4; ++k)
@@ -231,7 +237,7 @@ double step_for_volume(double wanted_mm3, double six_volumes, const Mover& mover
           Range(0, mine.quads.size(), 4096), 0.0,
           [&](const Range& some, double sum) {
             for (std::size_t i = some.begin(); i < some.end(); ++i)
-              sum += six_volumes_of(corners(mine.quads[i], s), shorter(corners(mine.quads[i], 1)));
+              sum += six_volumes_of(corners(mine.quads[i], s), diagonal(corners(mine.quads[i], 1)));
             return sum;
           },
           std::plus<>{});

@@ -46,6 +46,7 @@ class Mover {
     return to;
   }
   [[nodiscard]] bool free() const { return more_ > 0; }
+  [[nodiscard]] double voxel_mm() const { return static_cast<double>(voxel_); }
 
  private:
   /// std::floor() is a call where the processor is not known to be able to.

@@ -18,6 +18,7 @@
 #include "fibrolite/file.h"
 #include "fibrolite/random.h"
 #include "keep_volume.h"
+#include "quad_envelope.h"
 #include "weld.h"
 
 #ifdef __GLIBC__
@@ -169,7 +170,7 @@ class Finisher {
   }
 
   /// Each quad along the diagonal that is shorter after a whole move, as its volume was measured, unless that leaves a
-  /// triangle without area.
+  /// triangle without area or leads into another quad.
   void hand_on() {
     if (before_ + upper_ == 0) return;
     done_.triangles.resize(2 * quads_.size());
@@ -181,9 +182,14 @@ class Finisher {
     each_chunk(quads_.size(), [&](std::size_t i) {
       const Quad& q = quads_[i];
       bool first = squared_distance(q[0], q[2]) <= squared_distance(q[1], q[3]);
-      const auto without_area = [&](std::size_t a, std::size_t b, std::size_t c) { return flat(q[a], q[b], q[c]); };
-      if (first ? without_area(0, 1, 2) || without_area(0, 2, 3) : without_area(0, 1, 3) || without_area(1, 2, 3))
-        first = !first;
+      const auto sound = [&](std::size_t k) {
+        return !flat(q[k], q[k + 1], q[k + 2]) && !flat(q[k], q[k + 2], q[(k + 3) & 3]);
+      };
+      const auto wrong = [&] {
+        return wrong_diagonal({to_double(at(q[0])), to_double(at(q[1])), to_double(at(q[2])), to_double(at(q[3]))},
+                              voxel_mm_, first);
+      };
+      if (!sound(first ? 0 : 1) || (!mover_.free() && wrong() && sound(first ? 1 : 0))) first = !first;
       done_.triangles[2 * i] = {q[0], q[1], first ? q[2] : q[3]};
       done_.triangles[2 * i + 1] = {first ? q[0] : q[1], q[2], q[3]};
     });

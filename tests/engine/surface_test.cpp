@@ -20,6 +20,7 @@
 #include "fibrolite/realize.h"
 #include "mesh_checks.h"
 #include "models.h"
+#include "quad_envelope.h"
 
 namespace fibrolite {
 namespace {
@@ -192,6 +193,58 @@ TEST(Surface, does_not_cut_itself) {
     ASSERT_GT(mesh.triangles.size(), 100000U);
     EXPECT_EQ(inspect(mesh).self_intersections, 0);
   }
+}
+
+/// Is a point in the tetrahedron, or on it?
+bool in_tetrahedron(Vec3d p, Vec3d a, Vec3d b, Vec3d c, Vec3d d) {
+  const auto volume = [](Vec3d i, Vec3d j, Vec3d k, Vec3d l) { return dot(j - i, cross(k - i, l - i)); };
+  const double whole = volume(a, b, c, d), slack = 1e-9;
+  return volume(p, b, c, d) / whole > -slack && volume(a, p, c, d) / whole > -slack &&
+         volume(a, b, p, d) / whole > -slack && volume(a, b, c, p) / whole > -slack;
+}
+
+/// Of random quads around the edge from (3, 5, 7) to (4, 5, 7), by points along the diagonals.
+TEST(QuadEnvelope, tells_the_wrong_diagonal) {
+  Random random(1, "quads");
+  const Vec3d from{3, 5, 7}, to{4, 5, 7};
+  int wrong = 0;
+  for (int round = 0; round < 20000; ++round) {
+    // Often close to the lattice's planes, where it matters.
+    const auto in_cell = [&] { return std::pow(random.uniform(), 3.0); };
+    const auto along = [&] { return random.uniform() < 0.5 ? in_cell() : 1 - in_cell(); };
+    const std::array<Vec3d, 4> corners{
+        Vec3d{3 + along(), 5 + in_cell(), 7 + in_cell()}, Vec3d{3 + along(), 5 - in_cell(), 7 + in_cell()},
+        Vec3d{3 + along(), 5 - in_cell(), 7 - in_cell()}, Vec3d{3 + along(), 5 + in_cell(), 7 - in_cell()}};
+    const auto inside = [&](std::size_t k) {
+      bool all = true;
+      for (int i = 1; i < 200; ++i) {
+        const Vec3d p = corners[k] + i / 200.0 * (corners[k + 2] - corners[k]);
+        bool any = false;
+        for (std::size_t n = 0; n < 4; ++n) any = any || in_tetrahedron(p, from, to, corners[n], corners[(n + 1) & 3]);
+        all = all && any;
+      }
+      return all;
+    };
+    for (const bool first : {true, false}) {
+      if (!wrong_diagonal(corners, 1, first)) continue;
+      ++wrong;
+      EXPECT_FALSE(inside(first ? 0 : 1)) << round;
+      EXPECT_TRUE(inside(first ? 1 : 0)) << round;
+      // In other units, and along another axis.
+      std::array<Vec3d, 4> turned;
+      for (std::size_t k = 0; k < 4; ++k) turned[k] = 0.1 * Vec3d{corners[k].y, corners[k].z, corners[k].x};
+      EXPECT_TRUE(wrong_diagonal(turned, 0.1, first)) << round;
+    }
+  }
+  EXPECT_GT(wrong, 1000);
+}
+
+/// A quad of a bracket with gyroid walls, whose shorter diagonal ran through its neighbour.
+TEST(QuadEnvelope, knows_a_quad_that_was_wrong) {
+  const std::array<Vec3d, 4> corners{Vec3d{-94.636, -62.051, 154.453}, Vec3d{-95.042, -62.030, 154.033},
+                                     Vec3d{-95.012, -62.028, 153.500}, Vec3d{-94.997, -62.004, 153.495}};
+  EXPECT_TRUE(wrong_diagonal(corners, 1, false));
+  EXPECT_FALSE(wrong_diagonal(corners, 1, true));
 }
 
 TEST(Surface, of_touching_planes_on_the_lattice_has_no_degenerate_triangle) {

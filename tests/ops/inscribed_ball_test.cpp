@@ -166,6 +166,7 @@ TEST(InscribedBalls, fit_into_the_members_of_every_form_of_the_crystal) {
 TEST(InscribedBalls, fit_into_layer_and_columns_of_a_joint) {
   constexpr double wall = 1.2;
   HybridizeParams params{.recipe = thick(wall), .voxel_mm = wall / 8};
+  params.recipe.joint.spacing_mm = 2.25 * wall;  // for columns enough
   const Outcome made = hybridized(read_mesh(testing::asset("cylinder_on_box")).mesh, params);
   ASSERT_EQ(made.hybrid.joints.size(), 1U);
   ASSERT_GE(made.hybrid.joints[0].columns.size(), 3U);

@@ -24,7 +24,7 @@ struct SurfaceParams {
 };
 
 /// Dual surface of the zero level: closed, 2-manifold, outward, no degenerate triangle, at float coordinates. But for a
-/// stand-in no triangle cuts another: not proven, but so found in all solids tried, noise among them.
+/// stand-in no triangle cuts another: that is not proven, and one of 105 meshes tried had 3 pairs that do.
 /// Cost: O(leaves + triangles), parallel; peaks at about 70 bytes a vertex. The same bits on any number of threads.
 /// Source: Nielson 2004 (dual marching cubes), Wenger 2013 (its manifold case).
 /// @throws Error TooLarge (more than 2^32 - 1 vertices), Cancelled.
