@@ -147,8 +147,14 @@ struct Block {
   std::array<std::uint16_t, Leaf::SIZE> first;  ///< Vertex of each mixed cell's first sheet, in the block.
   std::array<std::uint16_t, Leaf::SIZE> kind;   ///< 8 bits of corners inside, then the joined face.
   std::vector<openvdb::Vec3s> points;
-  std::vector<Quad> quads;
-  std::size_t base = 0;  ///< Of its vertices among all.
+  std::size_t base = 0;   ///< Of its vertices among all.
+  std::size_t quads = 0;  ///< How many.
+
+  /// Which edges along x, y and z, of those from samples (x, y, 0) to (x, y, 7), cross the surface.
+  [[nodiscard]] std::array<unsigned, 3> crossed(unsigned x, unsigned y) const {
+    const unsigned row = inside[9 * x + y], right = inside[9 * x + 9 + y], up = inside[9 * x + y + 1];
+    return {(row ^ right) & 255U, (row ^ up) & 255U, (row ^ row >> 1) & 255U};
+  }
 };
 
 struct Samples {
@@ -205,8 +211,11 @@ class Cells {
     points_.clear();
     samples_.fetch(block_.origin, access_);
     rows_inside(samples_.value, block_.inside);
+    block_.quads = 0;
     for (unsigned x = 0; x < 8; ++x) {
       for (unsigned y = 0; y < 8; ++y) {
+        for (const unsigned edges_along : block_.crossed(x, y))
+          block_.quads += static_cast<std::size_t>(std::popcount(edges_along));
         const std::array<unsigned, 4> rows{block_.inside[9 * x + y], block_.inside[9 * x + 9 + y],
                                            block_.inside[9 * x + y + 1], block_.inside[9 * x + 9 + y + 1]};
         const unsigned any = rows[0] | rows[1] | rows[2] | rows[3], all = rows[0] & rows[1] & rows[2] & rows[3];
@@ -357,10 +366,8 @@ struct DualSurface::Impl {
     }
     if (points >= std::numeric_limits<std::uint32_t>::max())
       throw Error(Code::TooLarge, "the surface has more vertices than a mesh can hold", {}, "use a larger --voxel");
-    each([&](std::size_t i) { add_quads(i); });
-
     std::vector<std::size_t> quads{0};
-    for (std::size_t i = 0; i < count; ++i) quads.push_back(quads.back() + blocks[i].quads.size());
+    for (std::size_t i = 0; i < count; ++i) quads.push_back(quads.back() + blocks[i].quads);
     QuadLayer out;
     out.first = out_points;
     out.points.resize(points - out_points);
@@ -369,7 +376,7 @@ struct DualSurface::Impl {
       const Block& block = blocks[i];
       std::copy(block.points.begin(), block.points.end(),
                 out.points.begin() + static_cast<std::ptrdiff_t>(block.base - out_points));
-      std::copy(block.quads.begin(), block.quads.end(), out.quads.begin() + static_cast<std::ptrdiff_t>(quads[i]));
+      make_quads(i, out.quads.data() + quads[i]);
     });
     out_points = points;
     return out;
@@ -382,10 +389,8 @@ struct DualSurface::Impl {
     return at != end && at->origin == origin ? &*at : nullptr;
   }
 
-  void add_quads(std::size_t number) {
-    Block& block = layer.blocks[number];
-    block.quads.clear();
-    block.quads.reserve(block.points.size() + 32);  // about one for each vertex
+  void make_quads(std::size_t number, Quad* next) const {
+    const Block& block = layer.blocks[number];
     // Those on the lower sides, at bits 2, 1, 0 for x, y, z.
     std::array<const Block*, 8> lower{&block};
     for (int n = 1; n < 8; ++n) {
@@ -400,7 +405,7 @@ struct DualSurface::Impl {
       return static_cast<std::uint32_t>(in.base + in.first[at] + tables().sheets[kind & 255U][kind >> 8].of[e]);
     };
     const auto quad = [&](int x, int y, int z, unsigned along, bool inside) {
-      Quad q;
+      Quad& q = *next++;
       constexpr std::array<unsigned, 4> circle{0, 1, 3, 2};  // bits for a step down along the next axes
       for (std::size_t k = 0; k < 4; ++k) {
         std::array<int, 3> cell{x, y, z};
@@ -408,14 +413,11 @@ struct DualSurface::Impl {
         cell[(along + 2) % 3] -= static_cast<int>(circle[k] >> 1);
         q[inside ? k : 3 - k] = vertex(cell[0], cell[1], cell[2], 4 * along + circle[k]);
       }
-      block.quads.push_back(q);
     };
     for (int x = 0; x < 8; ++x) {
       for (int y = 0; y < 8; ++y) {
         const unsigned row = block.inside[static_cast<std::size_t>(9 * x + y)];
-        const std::array<unsigned, 3> next{block.inside[static_cast<std::size_t>(9 * x + 9 + y)],
-                                           block.inside[static_cast<std::size_t>(9 * x + y + 1)], row >> 1};
-        const std::array<unsigned, 3> crossed{(row ^ next[0]) & 255U, (row ^ next[1]) & 255U, (row ^ next[2]) & 255U};
+        const std::array<unsigned, 3> crossed = block.crossed(static_cast<unsigned>(x), static_cast<unsigned>(y));
         for (unsigned any = crossed[0] | crossed[1] | crossed[2]; any != 0; any &= any - 1) {
           const int z = std::countr_zero(any);
           for (unsigned along = 0; along < 3; ++along)
