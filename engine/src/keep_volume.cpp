@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +18,8 @@ namespace {
 
 using openvdb::Vec3s;
 
-/// Layers that are worked on at once, for the threads to share.
-constexpr std::size_t batch = 4;
+/// Layers that are worked on at once, for the threads to share; no more than that, for they wait in memory.
+std::size_t batch() { return static_cast<std::size_t>(std::clamp(tbb::this_task_arena::max_concurrency(), 2, 16)); }
 
 using Range = tbb::blocked_range<std::size_t>;
 
@@ -40,7 +41,7 @@ double six_volumes_of(const std::array<Vec3d, 4>& p, std::size_t diagonal) {
 void KeepVolume::add(QuadLayer&& layer, const Use& use) {
   Work& work = window_.emplace_back();
   static_cast<QuadLayer&>(work.layer) = std::move(layer);
-  if (window_.size() >= summed_ + batch) process(false, use);
+  if (window_.size() >= summed_ + batch()) process(false, use);
 }
 
 void KeepVolume::finish(const Use& use) { process(true, use); }
