@@ -178,7 +178,8 @@ class Checker {
       for (std::size_t i = range.begin(); i < range.end(); ++i) id[layer.before + i] = fresh + own[i];
     });
     const auto newer = equal_across(layer, id);
-    if (newer.empty()) return id;
+    renamed_ = !newer.empty();
+    if (!renamed_) return id;
     for (std::size_t i = 0; i < layer.before; ++i) {
       const auto at = std::lower_bound(newer.begin(), newer.end(), std::pair{id[i], std::uint32_t{0}});
       if (at != newer.end() && at->first == id[i]) id[i] = at->second;
@@ -247,7 +248,7 @@ class Checker {
   /// All vertices from first_ to end_, whose triangles are all there.
   void visit_all() {
     collect_corners();
-    if (!visit_closed()) visit_any();
+    if (renamed_ || !visit_closed()) visit_any();
   }
 
   /// If each vertex has one closed fan, and says so. Then what shares a vertex is connected: sets of vertices, half as
@@ -315,7 +316,7 @@ class Checker {
     if (!by_vertex_) return static_cast<std::uint32_t>(t);
     for (const std::uint32_t v : triangles_[t].corners)
       if (v >= first_ && v < end_) return v - static_cast<std::uint32_t>(first_);
-    throw Error(Code::Internal, "a triangle reaches over more than two layers");
+    throw Error(Code::Internal, "a triangle without a vertex to visit");
   }
 
   /// Triangles that are connected already: those with a shell come first.
@@ -465,6 +466,7 @@ class Checker {
   std::vector<Triangle> next_;        // without
   std::unique_ptr<Sets> sets_;        // of vertices to visit, or of triangles
   bool by_vertex_ = false;
+  bool renamed_ = false;  // a triangle may have no vertex to visit any more: all are at places in the next layer
   std::uint32_t shell_count_ = 0;
   std::size_t first_ = 0, end_ = 0;              // vertices to visit
   std::vector<std::uint32_t> starts_, corners_;  // a corner: four times its triangle, and which of it

@@ -133,15 +133,17 @@ TEST(SurfaceLayers, of_slabs_are_the_whole_surface_vertex_for_vertex) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-/// Layers with a fault in each: a hole, a triangle turned over, one there twice, or a vertex at the place of one in the
-/// layer before.
+/// Layers with a fault in each: a hole, a triangle turned over, one there twice, a vertex at the place of one in the
+/// layer before, or three at the places of a triangle's there.
 class Faulty final : public MeshLayers {
  public:
   Faulty(const MeshLayers& layers, int fault) : layers_(layers), fault_(fault) {}
   [[nodiscard]] std::size_t vertices() const override { return layers_.vertices(); }
   [[nodiscard]] std::size_t triangles() const override { return layers_.triangles(); }
   void each(const std::function<void(const MeshLayer&)>& use, const Context& context) const override {
-    Vec3f moved{};  // the first vertex of the layer before
+    Vec3f moved{};                   // the first vertex of the layer before
+    std::vector<Vec3f> moved_three;  // its first three
+    Mesh::Triangle within{};         // of the layer before alone
     layers_.each(
         [&](const MeshLayer& layer) {
           std::vector<Vec3f> vertices(layer.vertices.begin(), layer.vertices.end());
@@ -155,6 +157,19 @@ class Faulty final : public MeshLayers {
             moved = vertices[layer.before];
           } else if (layer.before < vertices.size()) {
             moved = vertices[layer.before];
+          }
+          if (fault_ == 4) {
+            std::copy(moved_three.begin(), moved_three.end(), vertices.begin());
+            moved_three.clear();
+            if (within[0] != within[1] && layer.before + 3 < vertices.size()) {
+              for (std::size_t i = 0; i < 3; ++i) {
+                vertices[layer.before + i] = vertices[within[i] - layer.first];
+                moved_three.push_back(vertices[layer.before + i]);
+              }
+            }
+            within = {};
+            for (const Mesh::Triangle& t : triangles)  // whose places have not been moved
+              if (std::min({t[0], t[1], t[2]}) >= layer.first + layer.before + 3) within = t;
           }
           use({vertices, layer.first, layer.before, triangles, {}});
         },
@@ -172,7 +187,7 @@ TEST(SurfaceLayers, check_finds_what_is_wrong_in_any_layers) {
   SurfaceLayers layers(solid.grid());
   layers.add(solid);
   layers.finish(solid.volume_mm3());
-  for (int fault = 0; fault < 4; ++fault) {
+  for (int fault = 0; fault < 5; ++fault) {
     const Faulty faulty(layers, fault);
     const MeshCheck by_layers = check(faulty);
     EXPECT_EQ(counts(by_layers), counts(check(gathered(faulty)))) << fault;
