@@ -3,7 +3,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
@@ -18,8 +17,7 @@
 #include "fibrolite/file.h"
 #include "fibrolite/random.h"
 #include "keep_volume.h"
-#include "quad_envelope.h"
-#include "weld.h"
+#include "quad_split.h"
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -110,7 +108,11 @@ class Finisher {
  public:
   using Use = std::function<void(FinishedLayer&)>;  ///< Which may swap it for another, to be written over.
   Finisher(double step, double voxel_mm, bool stand_in, Use use)
-      : step_(static_cast<float>(step)), mover_(voxel_mm, stand_in), voxel_mm_(voxel_mm), use_(std::move(use)) {}
+      : step_(static_cast<float>(step)),
+        mover_(voxel_mm, stand_in),
+        split_(voxel_mm, stand_in),
+        voxel_mm_(voxel_mm),
+        use_(std::move(use)) {}
 
   void add(const MovableLayer& layer) {
     const std::size_t from = points_.size();
@@ -127,39 +129,41 @@ class Finisher {
       whole_.resize(points_.size());
       each_chunk(layer.points.size(), [&](std::size_t i) { whole_[from + i] = moved(i, 1); });
     }
-    shake_degenerate(layer.quads);
+    next_.resize(2 * layer.quads.size());
+    if (!split_(layer.quads, vertices(), next_)) {
+      shake_degenerate(layer.quads);
+      split_(quads_of(waits_.triangles), vertices(), waits_.triangles);
+      split_(layer.quads, vertices(), next_);
+    }
     hand_on();
     before_ = upper_;
     upper_ = layer.points.size();
-    quads_ = layer.quads;
+    std::swap(waits_.triangles, next_);
     ++number_;
   }
   void finish() { hand_on(); }
 
  private:
-  [[nodiscard]] Vec3f at(std::uint32_t v) const { return points_[v - first_]; }
-  [[nodiscard]] bool flat(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
-    return zero_area(at(a), at(b), at(c));
-  }
-  [[nodiscard]] bool degenerate(const Quad& q) const {
-    return (flat(q[0], q[1], q[2]) || flat(q[0], q[2], q[3])) && (flat(q[0], q[1], q[3]) || flat(q[1], q[2], q[3]));
-  }
-  [[nodiscard]] bool any_degenerate(const Quads& quads) const {
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, quads.size(), 4096), false,
-        [&](const auto& range, bool found) {
-          for (std::size_t i = range.begin(); i < range.end() && !found; ++i) found = degenerate(quads[i]);
-          return found;
-        },
-        [](bool a, bool b) { return a || b; });
+  [[nodiscard]] QuadSplit::Vertices vertices() const { return {points_, whole_.empty() ? points_ : whole_, first_}; }
+
+  static Quads quads_of(const std::vector<Mesh::Triangle>& triangles) {
+    Quads quads(triangles.size() / 2);
+    for (std::size_t i = 0; i < quads.size(); ++i) {
+      const auto &one = triangles[2 * i], &other = triangles[2 * i + 1];
+      quads[i] = {one[0], one[1], other[1], other[2]};
+    }
+    return quads;
   }
 
   /// Quads that neither diagonal saves: move a corner by a thousandth of a voxel in a random direction and look again.
   void shake_degenerate(const Quads& quads) {
     Random random(1, "surface", number_);
-    for (int round = 0; round < 8 && any_degenerate(quads); ++round) {
+    bool any = true;
+    for (int round = 0; round < 8 && any; ++round) {
+      any = false;
       for (const auto& q : quads) {
-        if (!degenerate(q)) continue;
+        if (!QuadSplit::degenerate(q, vertices())) continue;
+        any = true;
         for (const std::uint32_t v : q) {
           const auto step = [&] { return static_cast<float>((random.uniform() - 0.5) * 4e-3 * voxel_mm_); };
           Vec3f& p = points_[v - first_];
@@ -169,34 +173,12 @@ class Finisher {
     }
   }
 
-  /// Each quad along the diagonal that is shorter after a whole move, as its volume was measured, unless that leaves a
-  /// triangle without area or leads into another quad.
   void hand_on() {
     if (before_ + upper_ == 0) return;
-    done_.triangles.resize(2 * quads_.size());
-    const std::vector<Vec3f>& points = whole_.empty() ? points_ : whole_;
-    const auto squared_distance = [&](std::uint32_t a, std::uint32_t b) {
-      const Vec3d d = to_double(points[a - first_]) - to_double(points[b - first_]);
-      return dot(d, d);
-    };
-    each_chunk(quads_.size(), [&](std::size_t i) {
-      const Quad& q = quads_[i];
-      bool first = squared_distance(q[0], q[2]) <= squared_distance(q[1], q[3]);
-      const auto sound = [&](std::size_t k) {
-        return !flat(q[k], q[k + 1], q[k + 2]) && !flat(q[k], q[k + 2], q[(k + 3) & 3]);
-      };
-      const auto wrong = [&] {
-        return wrong_diagonal({to_double(at(q[0])), to_double(at(q[1])), to_double(at(q[2])), to_double(at(q[3]))},
-                              voxel_mm_, first);
-      };
-      if (!sound(first ? 0 : 1) || (!mover_.free() && wrong() && sound(first ? 1 : 0))) first = !first;
-      done_.triangles[2 * i] = {q[0], q[1], first ? q[2] : q[3]};
-      done_.triangles[2 * i + 1] = {first ? q[0] : q[1], q[2], q[3]};
-    });
-    done_.vertices.assign(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_ + upper_));
-    done_.first = first_;
-    done_.before = before_;
-    use_(done_);
+    waits_.vertices.assign(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_ + upper_));
+    waits_.first = first_;
+    waits_.before = before_;
+    use_(waits_);
     const auto below = static_cast<std::ptrdiff_t>(before_);
     points_.erase(points_.begin(), points_.begin() + below);
     if (!whole_.empty()) whole_.erase(whole_.begin(), whole_.begin() + below);
@@ -205,14 +187,15 @@ class Finisher {
 
   float step_;
   const Mover mover_;
+  const QuadSplit split_;
   double voxel_mm_;
   const Use use_;
   // Of the layer below the one that waits, that one, and for a moment the next.
   std::vector<Vec3f> points_;
   std::vector<Vec3f> whole_;  // the same after a whole move, if that is another step
   std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
-  Quads quads_;  // of the one that waits
-  FinishedLayer done_;
+  FinishedLayer waits_;
+  std::vector<Mesh::Triangle> next_;  // of the next
 };
 
 }  // namespace

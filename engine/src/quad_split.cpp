@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "quad_split.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+
+#include "fibrolite/clones.h"
+#include "quad_envelope.h"
+
+namespace fibrolite {
+namespace {
+
+constexpr std::size_t lanes = 8;
+using Lanes [[gnu::vector_size(32)]] = float;
+using Mask [[gnu::vector_size(32)]] = std::int32_t;  // a lane is all ones or zero
+using Doubles [[gnu::vector_size(64)]] = double;
+
+/// Corners of eight quads, one coordinate of all beside each other.
+using Corners = std::array<std::array<Lanes, 3>, 4>;
+struct Choice {
+  std::array<std::int32_t, lanes> second;  ///< Is the second diagonal the shorter one?
+  std::array<std::int32_t, lanes> doubt;   ///< Must this one be looked at more closely?
+};
+
+/// By rounded products, with room for the rounding: what is in no doubt is right.
+[[gnu::always_inline]] inline void choose(const Corners& at, const Corners& shape, Choice& choice) {
+  Doubles first_length{}, second_length{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::array<Doubles, 4> corner;
+    for (std::size_t k = 0; k < 4; ++k) corner[k] = __builtin_convertvector(shape[k][axis], Doubles);
+    const Doubles one = corner[0] - corner[2], other = corner[1] - corner[3];
+    first_length += one * one;
+    second_length += other * other;
+  }
+  const Mask second = __builtin_convertvector(first_length > second_length, Mask);
+
+  std::array<Lanes, 3> u, across, v;  // from where the diagonal begins
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const Lanes begin = second ? at[1][axis] : at[0][axis];
+    u[axis] = (second ? at[2][axis] : at[1][axis]) - begin;
+    across[axis] = (second ? at[3][axis] : at[2][axis]) - begin;
+    v[axis] = (second ? at[0][axis] : at[3][axis]) - begin;
+  }
+  Lanes cosine{}, squared_n{}, squared_m{};
+  Mask clear_n{}, clear_m{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t y = (axis + 1) % 3, z = (axis + 2) % 3;
+    const Lanes n1 = u[y] * across[z], n2 = u[z] * across[y], m1 = across[y] * v[z], m2 = across[z] * v[y];
+    const Lanes n = n1 - n2, m = m1 - m2;
+    // Twice the greater one: no less than their sum.
+    const Lanes n12 = n1 * n1 > n2 * n2 ? n1 * n1 : n2 * n2, m12 = m1 * m1 > m2 * m2 ? m1 * m1 : m2 * m2;
+    clear_n |= n * n > 4e-12F * n12 + 1e-36F;
+    clear_m |= m * m > 4e-12F * m12 + 1e-36F;
+    cosine += n * m;
+    squared_n += n * n;
+    squared_m += m * m;
+  }
+  const Mask hardly_folds = (cosine > 0) & (cosine * cosine > 0.82F * squared_n * squared_m);
+  const Mask doubt = ~(clear_n & clear_m & hardly_folds);
+  std::memcpy(choice.second.data(), &second, sizeof second);
+  std::memcpy(choice.doubt.data(), &doubt, sizeof doubt);
+}
+
+[[gnu::always_inline]] inline void gather(const Quad* quads, std::size_t first, const Vec3f* places, Corners& at) {
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    std::array<std::array<float, lanes>, 3> flat;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const Vec3f& p = places[quads[lane][corner] - first];
+      flat[0][lane] = p.x;
+      flat[1][lane] = p.y;
+      flat[2][lane] = p.z;
+    }
+    std::memcpy(&at[corner], &flat, sizeof flat);
+  }
+}
+FIBROLITE_CLONES void choose(const Quad* quads, const QuadSplit::Vertices& vertices, Choice& choice) {
+  Corners at, shape;
+  gather(quads, vertices.first, vertices.places.data(), at);
+  const bool same = vertices.shape.data() == vertices.places.data();
+  if (!same) gather(quads, vertices.first, vertices.shape.data(), shape);
+  choose(at, same ? at : shape, choice);
+}
+
+/// Do both triangles have an area?
+bool sound(const Quad& q, bool first, const QuadSplit::Vertices& vertices) {
+  const auto flat = [&](std::size_t a, std::size_t b, std::size_t c) {
+    return zero_area(vertices.at(q[a]), vertices.at(q[b]), vertices.at(q[c & 3]));
+  };
+  const std::size_t k = first ? 0 : 1;
+  return !flat(k, k + 1, k + 2) && !flat(k, k + 2, k + 3);
+}
+
+}  // namespace
+
+bool QuadSplit::degenerate(const Quad& quad, const Vertices& vertices) {
+  return !sound(quad, true, vertices) && !sound(quad, false, vertices);
+}
+
+bool QuadSplit::operator()(std::span<const Quad> quads, const Vertices& vertices,
+                           std::span<Mesh::Triangle> triangles) const {
+  const auto wrong = [&](const Quad& q, bool first) {
+    std::array<Vec3d, 4> corners;
+    for (std::size_t k = 0; k < 4; ++k) corners[k] = to_double(vertices.at(q[k]));
+    return wrong_diagonal(corners, voxel_mm_, first);
+  };
+  const auto some = [&](const tbb::blocked_range<std::size_t>& range, bool all_sound) {
+    Choice choice;
+    for (std::size_t from = range.begin(); from < range.end(); from += lanes) {
+      const std::size_t count = std::min(lanes, range.end() - from);
+      std::array<Quad, lanes> last;
+      const Quad* eight = quads.data() + from;
+      if (count < lanes) {
+        last.fill(*eight);
+        std::copy_n(eight, count, last.begin());
+        eight = last.data();
+      }
+      choose(eight, vertices, choice);
+      for (std::size_t lane = 0; lane < count; ++lane) {
+        const Quad& q = eight[lane];
+        bool first = choice.second[lane] == 0;
+        if (choice.doubt[lane] != 0) {
+          const bool good = sound(q, first, vertices);
+          if (!good || (!stand_in_ && wrong(q, first))) {
+            const bool other = sound(q, !first, vertices);
+            all_sound = all_sound && (good || other);
+            if (!good || other) first = !first;
+          }
+        }
+        triangles[2 * (from + lane)] = {q[0], q[1], first ? q[2] : q[3]};
+        triangles[2 * (from + lane) + 1] = {first ? q[0] : q[1], q[2], q[3]};
+      }
+    }
+    return all_sound;
+  };
+  return tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, quads.size(), 4096), true, some, std::logical_and<>{});
+}
+
+}  // namespace fibrolite
