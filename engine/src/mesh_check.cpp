@@ -7,67 +7,24 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cstddef>
-#include <cstring>
-#include <memory>
-#include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include "fibrolite/clones.h"
+#include "closed_check.h"
+#include "closed_fan.h"
 #include "fibrolite/error.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/mesh_layers.h"
-#include "weld.h"
+#include "layer_weld.h"
+#include "shared_sets.h"
 
 namespace fibrolite {
 namespace {
 
 using Range = tbb::blocked_range<std::size_t>;
-
-// Union-find that several threads may use at once: a root only ever gets a
-// smaller parent, so the smallest member of a set is its root in the end,
-// whatever the order.
-class Sets {
- public:
-  explicit Sets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  /// Of which each begins in the set of another, with a smaller number, or its own.
-  explicit Sets(std::vector<std::uint32_t> parents) : parent_(std::move(parents)) {
-    for (std::uint32_t& up : parent_) up = parent_[up];
-  }
-
-  std::uint32_t root(std::uint32_t a) {
-    for (;;) {
-      const std::uint32_t up = load(a);
-      if (up == a) return a;
-      const std::uint32_t upper = load(up);
-      if (upper == up) return up;
-      std::uint32_t expected = up;  // path halving; if another thread was
-                                    // faster, its parent is as good
-      std::atomic_ref(parent_[a]).compare_exchange_weak(expected, upper, std::memory_order_relaxed);
-      a = upper;
-    }
-  }
-
-  [[nodiscard]] std::size_t size() const { return parent_.size(); }
-  bool is_root(std::uint32_t a) const { return parent_[a] == a; }
-
-  void join(std::uint32_t a, std::uint32_t b) {
-    if (load(a) == load(b)) return;  // as most neighbours
-    for (;;) {
-      a = root(a);
-      b = root(b);
-      if (a == b) return;
-      if (a < b) std::swap(a, b);
-      std::uint32_t expected = a;
-      if (std::atomic_ref(parent_[a]).compare_exchange_strong(expected, b, std::memory_order_relaxed)) return;
-    }
-  }
-
- private:
-  std::uint32_t load(std::uint32_t a) { return std::atomic_ref(parent_[a]).load(std::memory_order_relaxed); }
-  std::vector<std::uint32_t> parent_;
-};
 
 // One end of an edge at the vertex at hand: the other vertex, the corner it
 // belongs to, and whether the triangle runs away from the vertex along it.
@@ -76,42 +33,6 @@ struct Arc {
   std::uint32_t corner;
   bool outward;
 };
-
-/// Of the triangles around a vertex: where each edge out of it leads, and where each edge into it comes from.
-constexpr std::uint32_t most_in_fan = 16;
-struct Fan {
-  std::array<std::uint32_t, most_in_fan> out, in;
-};
-
-/// For each triangle the one whose way out is its way in: 1 for each that is (there must be one), and the numbers of
-/// those. All lanes side by side; those that are not used count as 1 of themselves.
-template <int lanes>
-[[gnu::always_inline]] inline bool match(const Fan& fan, std::uint32_t count,
-                                         std::array<std::uint32_t, most_in_fan>& next) {
-  using Lanes [[gnu::vector_size(32)]] = std::uint32_t;
-  constexpr std::size_t blocks = lanes / 8;
-  std::array<Lanes, blocks> in, at{}, times{};
-  std::memcpy(in.data(), fan.in.data(), sizeof in);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    for (std::size_t b = 0; b < blocks; ++b) {
-      const Lanes same = in[b] == fan.out[i] ? Lanes{} + 1 : Lanes{};
-      times[b] += same;
-      at[b] += same * i;
-    }
-  }
-  std::array<std::uint32_t, lanes> found;
-  std::memcpy(found.data(), times.data(), sizeof found);
-  std::memcpy(next.data(), at.data(), sizeof at);
-  bool one = true;
-  for (std::uint32_t i = 0; i < count; ++i) one &= found[i] == 1;
-  return one;
-}
-FIBROLITE_CLONES bool match_8(const Fan& fan, std::uint32_t count, std::array<std::uint32_t, most_in_fan>& next) {
-  return match<8>(fan, count, next);
-}
-FIBROLITE_CLONES bool match_16(const Fan& fan, std::uint32_t count, std::array<std::uint32_t, most_in_fan>& next) {
-  return match<16>(fan, count, next);
-}
 
 struct Tally {
   std::int64_t vertices = 0, boundary_edges = 0, nonmanifold_edges = 0, nonmanifold_vertices = 0;
@@ -131,11 +52,10 @@ class Checker {
   void add(const MeshLayer& layer) {
     if (layer.triangles.size() > 0xffffffffu / 4)
       throw Error(Code::TooLarge, "a mesh of over 1,073,741,823 triangles cannot be checked");
-    if (!begun_) {
-      Box3d box;
-      for (const Vec3f& v : layer.vertices) box.include(to_double(v));
-      if (!box.empty()) from_ = box.center();
-      begun_ = !box.empty();
+    weld_.next(layer);
+    if (!begun_ && !weld_.box.empty()) {
+      from_ = weld_.box.center();
+      begun_ = true;
     }
     result_.triangles += static_cast<std::int64_t>(layer.triangles.size());
     result_.volume_mm3 += signed_volume(layer, from_);
@@ -171,15 +91,16 @@ class Checker {
   /// What is open already gets them too.
   std::vector<std::uint32_t> name_vertices(const MeshLayer& layer) {
     std::vector<std::uint32_t> id = std::move(names_);
-    const std::vector<std::uint32_t> own = first_equal(layer.fresh());
+    const std::vector<std::uint32_t>& own = weld_.own;
     id.resize(layer.vertices.size());
     const auto fresh = static_cast<std::uint32_t>(layer.first + layer.before);
     tbb::parallel_for(Range(0, own.size(), 4096), [&](const Range& range) {
       for (std::size_t i = range.begin(); i < range.end(); ++i) id[layer.before + i] = fresh + own[i];
     });
-    const auto newer = equal_across(layer, id);
-    renamed_ = !newer.empty();
-    if (!renamed_) return id;
+    if (weld_.across.empty()) return id;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> newer;
+    for (const auto& [before, now] : weld_.across) newer.emplace_back(id[before], id[layer.before + now]);
+    std::sort(newer.begin(), newer.end());
     for (std::size_t i = 0; i < layer.before; ++i) {
       const auto at = std::lower_bound(newer.begin(), newer.end(), std::pair{id[i], std::uint32_t{0}});
       if (at != newer.end() && at->first == id[i]) id[i] = at->second;
@@ -188,35 +109,6 @@ class Checker {
       for (std::uint32_t& v : t.corners)
         if (v >= layer.first) v = id[v - layer.first];
     return id;
-  }
-
-  /// Numbers of vertices of the layer before with one in the same place in this layer, and its number; sorted. Only
-  /// where the boxes of both layers meet can there be any.
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> equal_across(const MeshLayer& layer,
-                                                                    const std::vector<std::uint32_t>& id) {
-    const std::array<std::span<const Vec3f>, 2> half{layer.vertices.first(layer.before), layer.fresh()};
-    std::array<Box3d, 2> box{box_, {}};
-    for (const Vec3f& v : half[1]) box[1].include(to_double(v));
-    box_ = box[1];
-    std::vector<Vec3f> places;
-    std::vector<std::uint32_t> number;
-    std::size_t from_before = 0;
-    for (std::size_t side = 0; side < 2; ++side) {
-      const Box3d& other = box[1 - side];
-      for (std::size_t i = 0; !other.empty() && i < half[side].size(); ++i) {
-        if (!other.contains(to_double(half[side][i]))) continue;
-        places.push_back(half[side][i]);
-        number.push_back(id[side * layer.before + i]);
-      }
-      if (side == 0) from_before = places.size();
-    }
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> newer;
-    if (from_before == 0 || from_before == places.size()) return newer;
-    const std::vector<std::uint32_t> first = first_equal(places);
-    for (std::size_t i = from_before; i < first.size(); ++i)
-      if (first[i] < from_before) newer.emplace_back(number[first[i]], number[i]);
-    std::sort(newer.begin(), newer.end());
-    return newer;
   }
 
   /// A layer's triangles, but those with two equal corners, which have no place in the topology: to visit now, if a
@@ -248,55 +140,8 @@ class Checker {
   /// All vertices from first_ to end_, whose triangles are all there.
   void visit_all() {
     collect_corners();
-    if (renamed_ || !visit_closed()) visit_any();
-  }
-
-  /// If each vertex has one closed fan, and says so. Then what shares a vertex is connected: sets of vertices, half as
-  /// many as triangles, that begin with a neighbour's.
-  bool visit_closed() {
-    const std::size_t count = end_ - first_;
-    std::vector<std::uint32_t> parents(count);
-    std::atomic<std::int64_t> used{0};
-    std::atomic<bool> closed{true};
-    tbb::parallel_for(Range(0, count, 1024), [&](const Range& range) {
-      std::int64_t mine = 0;
-      for (std::size_t v = range.begin(); v < range.end() && closed.load(std::memory_order_relaxed); ++v) {
-        const std::uint32_t begin = starts_[v], corners = starts_[v + 1] - begin;
-        auto least = static_cast<std::uint32_t>(first_ + v);
-        mine += corners > 0 ? 1 : 0;
-        if (corners > 0 && !closed_fan(begin, corners, [&](std::uint32_t, std::uint32_t from, std::uint32_t) {
-              if (from >= first_) least = std::min(least, from);
-            }))
-          closed = false;
-        parents[v] = least - static_cast<std::uint32_t>(first_);
-      }
-      used += mine;
-    });
-    if (!closed) return false;
-    result_.vertices += used;
-    by_vertex_ = true;
-    sets_ = std::make_unique<Sets>(std::move(parents));
-    join_shells();
-    tbb::parallel_for(Range(0, triangles_.size(), 4096), [&](const Range& range) {
-      for (std::size_t t = range.begin(); t < range.end(); ++t) {
-        const auto& [a, b, c] = triangles_[t].corners;
-        if (std::min({a, b, c}) >= first_ && std::max({a, b, c}) < end_) {
-          const auto from = static_cast<std::uint32_t>(first_);
-          sets_->join(a - from, b - from);
-          sets_->join(a - from, c - from);
-          continue;
-        }
-        const std::uint32_t one = node(t);
-        for (const std::uint32_t v : triangles_[t].corners)
-          if (v >= first_ && v < end_) sets_->join(one, v - static_cast<std::uint32_t>(first_));
-      }
-    });
-    return true;
-  }
-
-  void visit_any() {
-    by_vertex_ = false;
-    sets_ = std::make_unique<Sets>(triangles_.size());
+    sets_ = SharedSets(std::bit_ceil(triangles_.size() + 1));
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) sets_.start(t);
     join_shells();
     tbb::enumerable_thread_specific<Tally> tallies;
     tbb::parallel_for(Range(first_, end_, 1024), [&](const Range& range) {
@@ -311,21 +156,13 @@ class Checker {
     }
   }
 
-  /// What stands for a triangle among the sets.
-  [[nodiscard]] std::uint32_t node(std::size_t t) const {
-    if (!by_vertex_) return static_cast<std::uint32_t>(t);
-    for (const std::uint32_t v : triangles_[t].corners)
-      if (v >= first_ && v < end_) return v - static_cast<std::uint32_t>(first_);
-    throw Error(Code::Internal, "a triangle without a vertex to visit");
-  }
-
   /// Triangles that are connected already: those with a shell come first.
   void join_shells() {
     std::vector<std::uint32_t> of_shell(shell_count_, no_shell);
     for (std::uint32_t t = 0; t < triangles_.size() && triangles_[t].shell != no_shell; ++t) {
       std::uint32_t& one = of_shell[triangles_[t].shell];
-      if (one == no_shell) one = node(t);
-      sets_->join(one, node(t));
+      if (one == no_shell) one = t;
+      sets_.join(one, t);
     }
   }
 
@@ -334,19 +171,19 @@ class Checker {
     const auto open = [this](const Triangle& t) {
       return std::any_of(t.corners.begin(), t.corners.end(), [this](std::uint32_t v) { return v >= end_; });
     };
-    std::vector<std::uint32_t> number(sets_->size(), no_shell);
+    std::vector<std::uint32_t> number(triangles_.size(), no_shell);
     shell_count_ = 0;
-    std::size_t kept = 0;
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       if (!open(triangles_[t])) continue;
-      std::uint32_t& shell = number[sets_->root(node(t))];
+      std::uint32_t& shell = number[sets_.root(t)];
       if (shell == no_shell) shell = shell_count_++;
-      triangles_[kept] = triangles_[t];
-      triangles_[kept++].shell = shell;
     }
-    for (std::uint32_t i = 0; i < number.size(); ++i) {
-      const bool used = !by_vertex_ || starts_[i] != starts_[i + 1];
-      result_.shells += number[i] == no_shell && used && sets_->is_root(i) ? 1 : 0;
+    std::size_t kept = 0;
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+      result_.shells += sets_.is_root(t) && number[t] == no_shell ? 1 : 0;
+      if (!open(triangles_[t])) continue;
+      triangles_[kept] = triangles_[t];
+      triangles_[kept++].shell = number[sets_.root(t)];
     }
     triangles_.resize(kept);
   }
@@ -394,37 +231,30 @@ class Checker {
     for_corners([&](std::uint32_t& start, std::uint32_t corner) { corners_[--start] = corner; });
   }
 
-  /// Nearly every vertex: its triangles follow each other around it once, each edge in both directions. If so calls
-  /// `use` with each corner, the vertex its edge comes from, and the corner next to it there.
-  template <class Use>
-  bool closed_fan(std::uint32_t begin, std::uint32_t count, const Use& use) const {
-    if (count < 3 || count > most_in_fan) return false;
-    Fan fan;
+  /// Nearly every vertex: its triangles follow each other around it once, each edge in both directions.
+  template <std::uint32_t most>
+  [[nodiscard]] bool closed_fan(std::uint32_t begin, std::uint32_t count) const {
+    if (count < 3 || count > most) return false;
+    Fan<most> fan;
+    fan.clear();
     for (std::uint32_t c = 0; c < count; ++c) {
       const std::uint32_t i = corners_[begin + c] & 3;
       const auto& corners = triangles_[corners_[begin + c] >> 2].corners;
-      fan.out[c] = corners[i == 2 ? 0 : i + 1];
-      fan.in[c] = corners[i == 0 ? 2 : i - 1];
+      fan.put(c, corners[i == 2 ? 0 : i + 1], corners[i == 0 ? 2 : i - 1]);
     }
-    std::array<std::uint32_t, most_in_fan> next;
-    if (!(count <= 8 ? match_8(fan, count, next) : match_16(fan, count, next))) return false;
-    std::uint32_t at = next[0], steps = 1;
-    for (; at != 0 && steps < count; ++steps) at = next[at];
-    if (at != 0 || steps != count) return false;
-    for (std::uint32_t c = 0; c < count; ++c) use(corners_[begin + c], fan.in[c], corners_[begin + next[c]]);
-    return true;
+    return is_closed(fan, count);
   }
 
   // Judges one vertex and the edges to vertices with greater numbers, and joins
   // the triangles along those.
-  void visit(std::uint32_t v, Tally& tally) const {
+  void visit(std::uint32_t v, Tally& tally) {
     const std::uint32_t begin = starts_[v - first_], count = starts_[v - first_ + 1] - begin;
     if (count == 0) return;
     ++tally.vertices;
-    if (closed_fan(begin, count, [&](std::uint32_t mine, std::uint32_t from, std::uint32_t other) {
-          if (v < from) sets_->join(mine >> 2, other >> 2);
-        }))
+    if (count <= 8 ? closed_fan<8>(begin, count) : closed_fan<16>(begin, count)) {
+      for (std::uint32_t c = 1; c < count; ++c) sets_.join(corners_[begin] >> 2, corners_[begin + c] >> 2);
       return;
+    }
     tally.arcs.clear();
     tally.fan.resize(count);
     for (std::uint32_t c = 0; c < count; ++c) {
@@ -446,7 +276,7 @@ class Checker {
           --fans;
         }
         if (j > i && v < tally.arcs[i].other)
-          sets_->join(corners_[begin + tally.arcs[i].corner] >> 2, corners_[begin + tally.arcs[j].corner] >> 2);
+          sets_.join(corners_[begin + tally.arcs[i].corner] >> 2, corners_[begin + tally.arcs[j].corner] >> 2);
       }
       if (v > tally.arcs[i].other) continue;
       const auto triangles = static_cast<std::int64_t>(j - i);
@@ -458,15 +288,13 @@ class Checker {
 
   static constexpr std::uint32_t none = 0xffffffff, no_shell = none;
   MeshCheck result_;
+  LayerWeld weld_;
   Vec3d from_{};
   bool begun_ = false;
   std::vector<std::uint32_t> names_;  // of the last layer's vertices
-  Box3d box_;                         // around them
   std::vector<Triangle> triangles_;   // with a vertex to visit
   std::vector<Triangle> next_;        // without
-  std::unique_ptr<Sets> sets_;        // of vertices to visit, or of triangles
-  bool by_vertex_ = false;
-  bool renamed_ = false;  // a triangle may have no vertex to visit any more: all are at places in the next layer
+  SharedSets sets_{0};                // of triangles
   std::uint32_t shell_count_ = 0;
   std::size_t first_ = 0, end_ = 0;              // vertices to visit
   std::vector<std::uint32_t> starts_, corners_;  // a corner: four times its triangle, and which of it
@@ -475,6 +303,8 @@ class Checker {
 }  // namespace
 
 MeshCheck check(const MeshLayers& layers, const Context& context) {
+  // Nearly always nothing is wrong, and what is found out then costs less.
+  if (const std::optional<MeshCheck> sound = check_closed(layers, context)) return *sound;
   Checker checker;
   layers.each([&](const MeshLayer& layer) { checker.add(layer); }, context);
   return checker.finish();

@@ -60,7 +60,7 @@ class WholeMesh final : public MeshLayers {
 [[nodiscard]] double signed_volume(const MeshLayer& layer, Vec3d from);
 
 /// What check() says of the whole, from no more than two layers at once. Vertices with equal coordinates must lie in
-/// the same layer or in neighbouring ones. Cost: O(n) time, parallel; 30 bytes a triangle of two layers.
+/// the same layer or in neighbouring ones. Cost: O(n) time, parallel; 40 bytes a triangle of two layers.
 [[nodiscard]] MeshCheck check(const MeshLayers& layers, const Context& context = {});
 
 }  // namespace fibrolite
