@@ -171,10 +171,12 @@ struct Samples {
       for (int x = 0; x < nx; ++x) {
         for (int y = 0; y < ny; ++y) {
           float* to = value.data() + ((8 * dx + x) * 9 + 8 * dy + y) * 9 + 8 * dz;
-          if (from != nullptr) {
-            std::copy_n(from + x * 64 + y * 8, nz, to);
-          } else {
+          if (from == nullptr) {
             std::fill_n(to, nz, tile);
+          } else if (dz == 0) {
+            std::copy_n(from + x * 64 + y * 8, 8, to);  // of a length that the compiler knows
+          } else {
+            *to = from[x * 64 + y * 8];
           }
         }
       }
@@ -214,8 +216,8 @@ class Cells {
     block_.quads = 0;
     for (unsigned x = 0; x < 8; ++x) {
       for (unsigned y = 0; y < 8; ++y) {
-        for (const unsigned edges_along : block_.crossed(x, y))
-          block_.quads += static_cast<std::size_t>(std::popcount(edges_along));
+        const std::array<unsigned, 3> crossed = block_.crossed(x, y);
+        block_.quads += static_cast<std::size_t>(std::popcount(crossed[0] | crossed[1] << 8 | crossed[2] << 16));
         const std::array<unsigned, 4> rows{block_.inside[9 * x + y], block_.inside[9 * x + 9 + y],
                                            block_.inside[9 * x + y + 1], block_.inside[9 * x + 9 + y + 1]};
         const unsigned any = rows[0] | rows[1] | rows[2] | rows[3], all = rows[0] & rows[1] & rows[2] & rows[3];

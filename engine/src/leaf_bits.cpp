@@ -1,28 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "leaf_bits.h"
 
-#include <bit>
-#include <cstring>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
-#include "fibrolite/clones.h"
+#include <cstddef>
 
 namespace fibrolite {
 
-static_assert(std::endian::native == std::endian::little);
-
-FIBROLITE_CLONES LeafBits bits_below(const float* value, float below) {
+#ifdef __SSE2__
+LeafBits bits_below(const float* value, float below) {
   LeafBits bits{};
-  for (std::size_t x = 0; x < 8; ++x) {
-    std::array<std::uint8_t, 64> less;
-    for (std::size_t i = 0; i < 64; ++i) less[i] = value[64 * x + i] < below ? 1 : 0;
-    for (std::size_t y = 0; y < 8; ++y) {
-      std::uint64_t eight = 0;
-      std::memcpy(&eight, less.data() + 8 * y, 8);
-      bits[x] |= lowest_of_bytes(eight) << (8 * y);
-    }
+  const __m128 limit = _mm_set1_ps(below);
+  for (std::size_t i = 0; i < 512; i += 16) {
+    const auto less = [&](std::size_t k) { return _mm_castps_si128(_mm_cmplt_ps(_mm_loadu_ps(value + i + k), limit)); };
+    const __m128i bytes =
+        _mm_packs_epi16(_mm_packs_epi32(less(0), less(4)), _mm_packs_epi32(less(8), less(12)));  // all ones or none
+    bits[i / 64] |= static_cast<std::uint64_t>(_mm_movemask_epi8(bytes)) << (i % 64);
   }
   return bits;
 }
+#else
+LeafBits bits_below(const float* value, float below) {
+  LeafBits bits{};
+  for (std::size_t i = 0; i < 512; ++i)
+    bits[i / 64] |= static_cast<std::uint64_t>(value[i] < below ? 1 : 0) << (i % 64);
+  return bits;
+}
+#endif
 
 std::uint64_t face_of(const LeafBits& bits, unsigned axis, bool upper) {
   const unsigned layer = upper ? 7 : 0;

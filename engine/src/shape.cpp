@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 #include "fibrolite/clones.h"
@@ -166,24 +167,33 @@ Shape make(Args&&... args) {
 
 }  // namespace
 
-/// Eight side by side, for the compiler.
 FIBROLITE_CLONES Interval range_of(const float* v, int count) {
-  std::array<float, 8> low, high;
-  low.fill(v[0]);
-  high.fill(v[0]);
+  // Four rows of eight: one comparison need not wait for the one before.
+  using Lanes [[gnu::vector_size(32)]] = float;
+  constexpr int rows = 4, step = 8 * rows;
+  Lanes low[rows], high[rows];  // NOLINT(modernize-avoid-c-arrays): arrays of them are kept in registers
+  for (int r = 0; r < rows; ++r) low[r] = high[r] = Lanes{} + v[0];
   int i = 0;
-  for (; i + 8 <= count; i += 8) {
-    for (std::size_t k = 0; k < 8; ++k) {
-      const float x = v[static_cast<std::size_t>(i) + k];
-      low[k] = x < low[k] ? x : low[k];
-      high[k] = x > high[k] ? x : high[k];
+  for (; i + step <= count; i += step) {
+    for (int r = 0; r < rows; ++r) {
+      Lanes x;
+      std::memcpy(&x, v + i + 8 * r, sizeof x);
+      low[r] = x < low[r] ? x : low[r];
+      high[r] = x > high[r] ? x : high[r];
+    }
+  }
+  Interval all{v[0], v[0]};
+  for (int r = 0; r < rows; ++r) {
+    for (int k = 0; k < 8; ++k) {
+      all.lo = std::min(all.lo, low[r][k]);
+      all.hi = std::max(all.hi, high[r][k]);
     }
   }
   for (; i < count; ++i) {
-    low[0] = std::min(low[0], v[i]);
-    high[0] = std::max(high[0], v[i]);
+    all.lo = std::min(all.lo, v[i]);
+    all.hi = std::max(all.hi, v[i]);
   }
-  return {*std::min_element(low.begin(), low.end()), *std::max_element(high.begin(), high.end())};
+  return all;
 }
 
 Interval Shape::Function::bound(const Box3d& box) const {
