@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <utility>
 
@@ -17,6 +18,28 @@ namespace fibrolite {
 namespace {
 
 using openvdb::Vec3s;
+
+using Row = std::array<float, 4>;
+Four four(const Row& from) {
+  Four row;
+  std::memcpy(&row, from.data(), sizeof row);
+  return row;
+}
+void add_to(Row& to, Four more) {
+  const Four sum = four(to) + more;
+  std::memcpy(to.data(), &sum, sizeof sum);
+}
+bool same(Four a, Four b) {
+  const auto equal = a == b;
+  return (equal[0] & equal[1] & equal[2]) != 0;
+}
+Four cross(Four a, Four b) {
+  using Order [[gnu::vector_size(16)]] = std::int32_t;
+  constexpr Order next{1, 2, 0, 3}, last{2, 0, 1, 3};
+  return __builtin_shuffle(a, next) * __builtin_shuffle(b, last) -
+         __builtin_shuffle(a, last) * __builtin_shuffle(b, next);
+}
+Vec3s vec(Four f) { return {f[0], f[1], f[2]}; }
 
 /// Layers that are worked on at once, for the threads to share; no more than that, for they wait in memory.
 std::size_t batch() { return static_cast<std::size_t>(std::clamp(tbb::this_task_arena::max_concurrency(), 2, 16)); }
@@ -91,20 +114,15 @@ void KeepVolume::sum_around(std::size_t n) {
     return v >= first ? work.layer.points[v - first] : below->layer.points[v - below->layer.first];
   };
   for (const Quad& q : work.layer.quads) {
-    const std::array<Vec3s, 4> p{point(q[0]), point(q[1]), point(q[2]), point(q[3])};
-    const Vec3s normal = (p[2] - p[0]).cross(p[3] - p[1]);
-    const float length = normal.length();
+    const std::array<Four, 4> p{four(point(q[0])), four(point(q[1])), four(point(q[2])), four(point(q[3]))};
+    const Four normal = cross(p[2] - p[0], p[3] - p[1]);
+    const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    const Four bend{normal[0], normal[1], normal[2], length};
     for (std::size_t k = 0; k < 4; ++k) {
       Umbrella& u = q[k] >= first ? work.mine[q[k] - first] : below->above[q[k] - below->layer.first];
-      const Vec3s d = p[(k + 1) & 3] + p[(k + 3) & 3] - 2.0F * p[k];
-      u.x += d.x();
-      u.y += d.y();
-      u.z += d.z();
-      u.nx += normal.x();
-      u.ny += normal.y();
-      u.nz += normal.z();
-      u.flatness += length;
-      u.edges += 2;
+      const Four edges = p[(k + 1) & 3] + p[(k + 3) & 3] - 2.0F * p[k] + Four{0, 0, 0, 2};
+      add_to(u.edges, edges);
+      add_to(u.bends, bend);
     }
   }
 }
@@ -115,16 +133,15 @@ void KeepVolume::settle(std::size_t n) {
     Umbrella& u = work.mine[i];
     if (!work.above.empty()) {
       const Umbrella& more = work.above[i];
-      u.x += more.x, u.y += more.y, u.z += more.z;
-      u.nx += more.nx, u.ny += more.ny, u.nz += more.nz;
-      u.flatness += more.flatness;
-      u.edges += more.edges;
+      add_to(u.edges, four(more.edges));
+      add_to(u.bends, four(more.bends));
     }
-    const float length = std::sqrt(u.nx * u.nx + u.ny * u.ny + u.nz * u.nz), mean = 1 / std::max(u.edges, 1.0F);
+    const auto [x, y, z, edges] = u.edges;
+    const auto [nx, ny, nz, lengths] = u.bends;
+    const float length = std::sqrt(nx * nx + ny * ny + nz * nz), mean = 1 / std::max(edges, 1.0F);
     const float unit = length > 0 ? 1 / length : 0;
-    u.nx *= unit, u.ny *= unit, u.nz *= unit;
-    u.x = mean * (u.x * u.nx + u.y * u.ny + u.z * u.nz);
-    u.flatness = u.flatness > 0 ? length / u.flatness : 0;
+    u.bends = {nx * unit, ny * unit, nz * unit, lengths > 0 ? length / lengths : 0};
+    u.mean() = mean * (x * u.normal(0) + y * u.normal(1) + z * u.normal(2));
     u.flattest() = 0;
     u.sharpest() = 1;
   }
@@ -140,8 +157,8 @@ void KeepVolume::look_around(std::size_t n) {
     float most = 0, least = 1;
     for (std::size_t k = 0; k < 4; ++k) {
       u[k] = q[k] >= first ? &work.mine[q[k] - first] : &window_[n - 1].mine[q[k] - window_[n - 1].layer.first];
-      most = std::max(most, u[k]->flatness);
-      least = std::min(least, u[k]->flatness);
+      most = std::max(most, u[k]->flatness());
+      least = std::min(least, u[k]->flatness());
     }
     for (Umbrella* one : u) {
       one->flattest() = std::max(one->flattest(), most);
@@ -155,8 +172,11 @@ void KeepVolume::choose_moves(std::size_t n) {
   constexpr float bent = 0.88F, flat = 0.95F;     // of the flattest vertex around it
   // Beside an edge there is a vertex on a face, and one on the edge, in whichever cells of the lattice that runs.
   constexpr float blunt = 0.96F, round = 0.985F, nearly_plane = 0.998F, plane = 0.9995F;
-  const auto ramp = [](float x, float from, float to) {
-    return std::min(std::max((x - from) / (to - from), 0.0F), 1.0F);
+  constexpr Four from{sharp, bent, blunt, nearly_plane};
+  constexpr Four size{smooth - sharp, flat - bent, round - blunt, plane - nearly_plane};
+  const auto ramps = [&](Four x) {
+    const Four share = (x - from) / size, least = share > 0 ? share : Four{};
+    return least < 1 ? least : Four{} + 1.0F;
   };
   const auto rounded = [](float x) { return static_cast<std::int16_t>(x + (x < 0 ? -0.5F : 0.5F)); };
   Work& work = window_[n];
@@ -165,22 +185,23 @@ void KeepVolume::choose_moves(std::size_t n) {
   const Points& points = work.layer.points;
   work.layer.moves.resize(count);
   work.moved.resize(count);
-  Vec3s cell, next = count > 0 ? mover_.cell(points[0]) : Vec3s(0);
+  const auto cell_of = [&](std::size_t i) { return mover_.cell(four(points[i])); };
+  Four cell{}, next = count > 0 ? cell_of(0) : Four{};
   bool with_last = false;
   for (std::size_t i = 0; i < count; ++i) {
     Umbrella& u = work.mine[i];
     cell = next;
-    if (i + 1 < count) next = mover_.cell(points[i + 1]);
-    const bool with_next = i + 1 < count && next == cell, stays = !mover_.free() && (with_last || with_next);
+    if (i + 1 < count) next = cell_of(i + 1);
+    const bool with_next = i + 1 < count && same(next, cell), stays = !mover_.free() && (with_last || with_next);
     with_last = with_next;
-    const float edge = (1 - ramp(u.flatness, sharp, smooth)) * ramp(u.flattest(), bent, flat);
+    const Four ramp = ramps(Four{u.flatness(), u.flattest(), u.sharpest(), u.flattest()});
+    const float edge = (1 - ramp[0]) * ramp[1];
     // The edge of a box hangs lower than its face: pushed out for that, the face would get a ridge.
-    const float beside =
-        mover_.free() ? 0 : (1 - ramp(u.sharpest(), blunt, round)) * ramp(u.flattest(), nearly_plane, plane);
-    const float by = std::min(std::max((std::max(edge, beside) - 1) * u.x * per_unit, -32767.0F), 32767.0F);
+    const float beside = mover_.free() ? 0 : (1 - ramp[2]) * ramp[3];
+    const float by = std::min(std::max((std::max(edge, beside) - 1) * u.mean() * per_unit, -32767.0F), 32767.0F);
     MovableLayer::Move& move = work.layer.moves[i];
-    if (!stays) move = {rounded(by * u.nx), rounded(by * u.ny), rounded(by * u.nz)};
-    work.moved[i] = mover_(points[i], cell, move, 1);
+    if (!stays) move = {rounded(by * u.normal(0)), rounded(by * u.normal(1)), rounded(by * u.normal(2))};
+    work.moved[i] = vec(mover_(four(points[i]), cell, move, 1));
   }
   work.mine = {};
 }
@@ -219,7 +240,7 @@ double step_for_volume(double wanted_mm3, double six_volumes, const Mover& mover
       tbb::parallel_for(Range(0, mine.points.size(), 4096), [&](const Range& some) {
         for (std::size_t i = some.begin(); i < some.end(); ++i) {
           const Vec3s& p = mine.points[i];
-          places[s][i] = mine.moves.empty() ? p : mover(p, mover.cell(p), mine.moves[i], steps[s]);
+          places[s][i] = mine.moves.empty() ? p : vec(mover(four(p), mover.cell(four(p)), mine.moves[i], steps[s]));
         }
       });
     }

@@ -21,6 +21,10 @@ struct MovableLayer : QuadLayer {
 /// A 32767th of the longest move, 0.35 voxels: mm.
 [[nodiscard]] constexpr float move_unit(double voxel_mm) { return static_cast<float>(0.35 * voxel_mm / 32767); }
 
+/// Coordinates side by side; the last one is no matter.
+using Four [[gnu::vector_size(16)]] = float;
+[[nodiscard]] inline Four four(const openvdb::Vec3s& p) { return Four{p.x(), p.y(), p.z(), 0}; }
+
 /// Where a move takes a point: free, or so that it keeps two fifths of its distance to each plane of the
 /// lattice. Then it stays in its cell and apart from what lies around the lattice's points and edges, and no triangles
 /// cut each other.
@@ -32,28 +36,22 @@ class Mover {
         unit_(move_unit(voxel_mm)),
         more_(free ? 2 * voxel_ : 0) {}
   /// The lowest corner of a point's cell, in voxels.
-  [[nodiscard]] openvdb::Vec3s cell(const openvdb::Vec3s& p) const {
-    return {below(p.x() * per_voxel_), below(p.y() * per_voxel_), below(p.z() * per_voxel_)};
+  [[nodiscard]] Four cell(Four point) const {
+    using Cut [[gnu::vector_size(16)]] = std::int32_t;
+    const Four at = point * per_voxel_, cut = __builtin_convertvector(__builtin_convertvector(at, Cut), Four);
+    return cut > at ? cut - 1 : cut;
   }
-  [[nodiscard]] openvdb::Vec3s operator()(const openvdb::Vec3s& point, const openvdb::Vec3s& cell,
-                                          const MovableLayer::Move& move, float step) const {
-    openvdb::Vec3s to;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float p = point[axis], by = step * unit_ * static_cast<float>(move[static_cast<std::size_t>(axis)]);
-      const float low = voxel_ * cell[axis] - p, high = low + voxel_;
-      to[axis] = p + std::min(std::max(by, 0.6F * low - more_), 0.6F * high + more_);
-    }
-    return to;
+  [[nodiscard]] Four operator()(Four point, Four cell, const MovableLayer::Move& move, float step) const {
+    const Four by =
+        step * unit_ * Four{static_cast<float>(move[0]), static_cast<float>(move[1]), static_cast<float>(move[2]), 0};
+    const Four low = voxel_ * cell - point, high = low + voxel_;
+    const Four least = 0.6F * low - more_, most = 0.6F * high + more_, some = by > least ? by : least;
+    return point + (some < most ? some : most);
   }
   [[nodiscard]] bool free() const { return more_ > 0; }
   [[nodiscard]] double voxel_mm() const { return static_cast<double>(voxel_); }
 
  private:
-  /// std::floor() is a call where the processor is not known to be able to.
-  [[nodiscard]] static float below(float x) {
-    const auto cut = static_cast<float>(static_cast<std::int32_t>(x));
-    return cut > x ? cut - 1 : cut;
-  }
   float voxel_, per_voxel_, unit_, more_;  // longer than any move, if free
 };
 
@@ -80,13 +78,14 @@ class KeepVolume {
 
  private:
   struct Umbrella {
-    float x = 0, y = 0, z = 0;     // sum of edge vectors to neighbours; later x: their mean, along the normal
-    float nx = 0, ny = 0, nz = 0;  // sum of quad normals; later of length 1
-    float flatness = 0;  // their lengths, summed: longer than the sum where the surface bends; later the ratio
-    float edges = 0;     // neighbours, counted once per quad
-    // Later, of the vertices around:
-    float& flattest() { return edges; }
-    float& sharpest() { return y; }
+    std::array<float, 4> edges{};  // sum of edge vectors to neighbours, and how many: each counted once per quad
+    std::array<float, 4> bends{};  // sum of quad normals, and their lengths, summed: longer where the surface bends
+    // Later:
+    float& mean() { return edges[0]; }                       // of the edge vectors, along the normal
+    float& sharpest() { return edges[1]; }                   // of the vertices around
+    float& flattest() { return edges[3]; }                   // of those too
+    float& normal(std::size_t axis) { return bends[axis]; }  // of length 1
+    float& flatness() { return bends[3]; }                   // length of the sum over sum of the lengths
   };
   struct Work {
     MovableLayer layer;

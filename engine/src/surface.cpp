@@ -118,10 +118,9 @@ class Finisher {
     const std::size_t from = points_.size();
     if (from == 0) first_ = layer.first;
     const auto moved = [&](std::size_t i, float step) {
-      const openvdb::Vec3s p = layer.moves.empty()
-                                   ? layer.points[i]
-                                   : mover_(layer.points[i], mover_.cell(layer.points[i]), layer.moves[i], step);
-      return Vec3f{p.x(), p.y(), p.z()};
+      Four p = four(layer.points[i]);
+      if (!layer.moves.empty()) p = mover_(p, mover_.cell(p), layer.moves[i], step);
+      return Vec3f{p[0], p[1], p[2]};
     };
     points_.resize(from + layer.points.size());
     each_chunk(layer.points.size(), [&](std::size_t i) { points_[from + i] = moved(i, step_); });
