@@ -18,6 +18,7 @@
 
 #include "closed_fan.h"
 #include "dual_surface.h"
+#include "layer_sums.h"
 #include "layer_weld.h"
 #include "shared_sets.h"
 
@@ -41,8 +42,10 @@ class ClosedChecker {
       begun_ = true;
     }
     result_.triangles += static_cast<std::int64_t>(layer.triangles.size());
-    result_.volume_mm3 += signed_volume(layer, from_);
-    result_.degenerate_triangles += count_degenerate(layer);
+    const LayerSums sums = sums_of(layer, from_);
+    if (sums.collapsed > 0) throw NotClosed{};
+    result_.volume_mm3 += sums.volume_mm3;
+    result_.degenerate_triangles += sums.degenerate;
     const std::size_t end = layer.first + layer.vertices.size();
     if (end >= Fan<16>::first_unused) throw NotClosed{};
     make_room(layer.first, layer.first + layer.before, end);
@@ -61,20 +64,6 @@ class ClosedChecker {
   struct More {
     std::uint32_t vertex, to, from;
   };
-
-  static std::int64_t count_degenerate(const MeshLayer& layer) {
-    return tbb::parallel_reduce(
-        Range(0, layer.triangles.size(), 4096), std::int64_t{0},
-        [&](const Range& range, std::int64_t flat) {
-          for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const auto& [a, b, c] = layer.triangles[t];
-            if (a == b || b == c || c == a) throw NotClosed{};
-            flat += zero_area(layer.at(a), layer.at(b), layer.at(c)) ? 1 : 0;
-          }
-          return flat;
-        },
-        std::plus<>{});
-  }
 
   /// For the vertices of two layers: rings, in which those of the one before stay where they are.
   void make_room(std::size_t first, std::size_t middle, std::size_t end) {
@@ -129,7 +118,7 @@ class ClosedChecker {
         put(a, b, c);
         put(b, c, a);
         put(c, a, b);
-        if (more[share].size() > 0 && too_many) return;
+        if (!more[share].empty() && too_many) return;
       }
     });
     if (too_many) throw NotClosed{};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "components.h"
 
+#include <openvdb/tree/LeafManager.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -135,13 +136,15 @@ void Components::find_blocks(const Tree& tree) {
   const openvdb::Coord low(low_.x() * 8, low_.y() * 8, low_.z() * 8);
   const openvdb::CoordBBox box(low, low.offsetBy(8 * n_.x() - 1, 8 * n_.y() - 1, 8 * n_.z() - 1));
   block_.assign(static_cast<std::size_t>(count), void_tile);
-  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
-    const openvdb::Coord o = leaf->origin();
-    if (!box.isInside(o)) continue;
-    block_[index(openvdb::Coord(o.x() >> 3, o.y() >> 3, o.z() >> 3) - low_)] =
-        static_cast<std::int32_t>(tree_leaves_.size());
-    tree_leaves_.push_back(leaf.getLeaf());
+  const openvdb::tree::LeafManager<const Tree> leaves(tree);
+  tree_leaves_.reserve(leaves.leafCount());
+  for (std::size_t i = 0; i < leaves.leafCount(); ++i) {
+    if (box.isInside(leaves.leaf(i).origin())) tree_leaves_.push_back(&leaves.leaf(i));
   }
+  tbb::parallel_for(std::size_t{0}, tree_leaves_.size(), [&](std::size_t i) {
+    const openvdb::Coord o = tree_leaves_[i]->origin();
+    block_[index(openvdb::Coord(o.x() >> 3, o.y() >> 3, o.z() >> 3) - low_)] = static_cast<std::int32_t>(i);
+  });
   auto tile = tree.cbeginValueAll();
   tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; tile; ++tile) {

@@ -10,34 +10,14 @@
 #include <functional>
 #include <span>
 
+#include "layer_sums.h"
 #include "weld.h"
 
 namespace fibrolite {
-namespace {
-
-using Range = tbb::blocked_range<std::size_t>;
-
-Box3d around(std::span<const Vec3f> vertices) {
-  return tbb::parallel_reduce(
-      Range(0, vertices.size(), 4096), Box3d{},
-      [&](const Range& range, Box3d box) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) box.include(to_double(vertices[i]));
-        return box;
-      },
-      [](Box3d a, const Box3d& b) {
-        if (b.empty()) return a;
-        a.include(b.min);
-        a.include(b.max);
-        return a;
-      });
-}
-
-}  // namespace
-
 void LayerWeld::next(const MeshLayer& layer) {
   own = first_equal(layer.fresh());
   across.clear();
-  const std::array<Box3d, 2> boxes{box, around(layer.fresh())};
+  const std::array<Box3d, 2> boxes{box, box_of(layer.fresh())};
   box = boxes[1];
   // Only where both boxes meet.
   const Box3d both{{std::max(boxes[0].min.x, boxes[1].min.x), std::max(boxes[0].min.y, boxes[1].min.y),
@@ -64,6 +44,7 @@ void LayerWeld::next(const MeshLayer& layer) {
 }
 
 bool LayerWeld::any() const {
+  using Range = tbb::blocked_range<std::size_t>;
   return !across.empty() || tbb::parallel_reduce(
                                 Range(0, own.size(), 4096), false,
                                 [&](const Range& range, bool found) {

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <optional>
@@ -18,6 +17,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/mesh_layers.h"
+#include "layer_sums.h"
 #include "layer_weld.h"
 #include "shared_sets.h"
 
@@ -58,7 +58,9 @@ class Checker {
       begun_ = true;
     }
     result_.triangles += static_cast<std::int64_t>(layer.triangles.size());
-    result_.volume_mm3 += signed_volume(layer, from_);
+    const LayerSums sums = sums_of(layer, from_);
+    result_.volume_mm3 += sums.volume_mm3;
+    result_.degenerate_triangles += sums.degenerate;
     names_ = name_vertices(layer);
     append(layer);
     end_ = layer.first + layer.before;
@@ -114,16 +116,6 @@ class Checker {
   /// A layer's triangles, but those with two equal corners, which have no place in the topology: to visit now, if a
   /// vertex of the layer before is among their corners, or next.
   void append(const MeshLayer& layer) {
-    std::atomic<std::int64_t> degenerate{0};
-    tbb::parallel_for(Range(0, layer.triangles.size(), 4096), [&](const Range& range) {
-      std::int64_t flat = 0;
-      for (std::size_t t = range.begin(); t < range.end(); ++t) {
-        const auto& [a, b, c] = layer.triangles[t];
-        flat += zero_area(layer.at(a), layer.at(b), layer.at(c)) ? 1 : 0;
-      }
-      degenerate += flat;
-    });
-    result_.degenerate_triangles += degenerate;
     const std::size_t fresh = layer.first + layer.before;
     next_.reserve(layer.triangles.size());
     for (const auto& [a, b, c] : layer.triangles) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fibrolite/ops/dangling.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -170,17 +172,27 @@ struct StickSweep::Impl {
       const Vec3i at = nearest(line.point(k));
       if (range.holds(at)) line.note(k, body.at(at) < inside, solid.at(at) < 0);
     };
+    std::vector<Capsule> within;  // the slab
+    const auto look_along = [&] {
+      std::vector<std::optional<Line>> lines(within.size());
+      tbb::parallel_for(std::size_t{0}, within.size(), [&](std::size_t i) {
+        Line line(within[i], voxel_mm);
+        look(line, 0);
+        look(line, line.last());
+        if (!line.is(Line::lumen, 0) && !line.is(Line::lumen, line.last())) return;
+        for (std::size_t k = 1; k < line.last(); ++k) look(line, k);
+        lines[i] = std::move(line);
+      });
+      for (std::optional<Line>& line : lines)
+        if (line) complete.push_back(*std::move(line));
+      within.clear();
+    };
     sticks.visit(part_of_box(range), [&](const Capsule& stick) {
       const int a = place(nearest(stick.a), range.axis), b = place(nearest(stick.b), range.axis);
       const int low = std::min(a, b) - 1, high = std::max(a, b) + 1;  // one more: places between them are rounded too
       if (high < range.low || low >= range.high) return;
       if (low >= range.low && high < range.high) {
-        Line line(stick, voxel_mm);
-        look(line, 0);
-        look(line, line.last());
-        if (!line.is(Line::lumen, 0) && !line.is(Line::lumen, line.last())) return;
-        for (std::size_t k = 1; k < line.last(); ++k) look(line, k);
-        complete.push_back(std::move(line));
+        within.push_back(stick);
       } else {
         const auto at = open.try_emplace({key(stick.a), key(stick.b)}, stick, voxel_mm).first;
         Line& line = at->second;
@@ -189,10 +201,12 @@ struct StickSweep::Impl {
         complete.push_back(std::move(line));
         open.erase(at);
       }
-      if (complete.size() < batch_size) return;
+      if (within.size() + complete.size() < batch_size) return;
       context.check();
+      look_along();
       record();
     });
+    look_along();
     record();
   }
 

@@ -56,9 +56,6 @@ class WholeMesh final : public MeshLayers {
 /// All layers in memory. Cost: O(n).
 [[nodiscard]] Mesh gathered(const MeshLayers& layers, const Context& context = {});
 
-/// What its triangles add to the volume, mm3, measured from a point. The same bits on any number of threads.
-[[nodiscard]] double signed_volume(const MeshLayer& layer, Vec3d from);
-
 /// What check() says of the whole, from no more than two layers at once. Vertices with equal coordinates must lie in
 /// the same layer or in neighbouring ones. Cost: O(n) time, parallel; 40 bytes a triangle of two layers.
 [[nodiscard]] MeshCheck check(const MeshLayers& layers, const Context& context = {});
