@@ -44,11 +44,10 @@ struct GenerateOptions {
     if (fix) return "--fix";
     return made_by.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "";
   }
-  [[nodiscard]] std::vector<fs::path> targets() const {
-    std::vector<fs::path> all = output.files;
-    all.insert(all.end(), pictures.files.begin(), pictures.files.end());
+  /// What may be written besides the outputs and their report.
+  [[nodiscard]] std::vector<fs::path> more_files() const {
+    std::vector<fs::path> all = pictures.files;
     if (steps) all.push_back(*steps);
-    all.push_back(output.report_path());
     return all;
   }
 };
@@ -64,7 +63,8 @@ double expected_bytes(const fs::path& file, const Prediction& expected) {
 /// How much less it takes on some threads than on one.
 double shared_among(int threads) { return 1 + 0.65 * (threads - 1); }
 
-std::string plan(const GenerateOptions& options, const Model& model, const HybridizeParams& params) {
+std::string plan(const GenerateOptions& options, const Model& model, const HybridizeParams& params,
+                 const fs::path& report) {
   const Vec3d size = bounds(model.mesh).size();
   std::string text = "model     " + options.model.path.string() + ", " + std::to_string(model.mesh.triangles.size()) +
                      " triangles, " + number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) +
@@ -83,7 +83,7 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
           number_text(cpu_s, 2) + " s of CPU, and what the disk takes\n";
   for (const fs::path& file : options.output.files)
     text += "output    " + file.string() + ", about " + memory_text(expected_bytes(file, expected)) + "\n";
-  text += "output    " + options.output.report_path().string() + "\n";
+  text += "output    " + report.string() + "\n";
   return text + "dry run: nothing was written\n";
 }
 
@@ -134,7 +134,7 @@ void generate(const GenerateOptions& options) {
 
   if (options.pictures.views.size() > options.pictures.files.size())
     throw UsageError("more views than pictures", "--view", "give each a --picture");
-  Job job("generate", params.recipe, options.model, options.run, options.targets());
+  Job job("generate", params.recipe, options.model, options.run, options.output, options.more_files());
   const Context& context = job.context();
   Outputs& outputs = job.outputs;
   Report& report = job.report;
@@ -149,7 +149,7 @@ void generate(const GenerateOptions& options) {
   params.slabs = fit_into_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
                                  {.axis = axis, .margin_mm = 8 * *params.voxel_mm, .surface = true}, 0,
                                  options.needs_whole(params.recipe));
-  if (options.run.dry_run) return print(plan(options, model, params));
+  if (options.run.dry_run) return print(plan(options, model, params, job.report_path));
 
   // Each thing goes as soon as nothing needs it: at the end only the surface and its check are in memory.
   Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.75, "fill"));
@@ -185,8 +185,8 @@ void generate(const GenerateOptions& options) {
     for (const fs::path& file : options.output.files)
       if (!is_vdb(file)) write_mesh(outputs.place(file), layers, context.part(0.94, 1, "write"));
   });
-  job.finish(options.output.report_path());
-  if (!options.run.quiet) print_summary(report, options.targets());
+  job.finish();
+  if (!options.run.quiet) print_summary(report, job.targets);
 }
 
 }  // namespace

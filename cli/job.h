@@ -17,15 +17,17 @@ namespace fibrolite::cli {
 /// Threads, terminal, outputs and report of one command. One at a time.
 class Job {
  public:
-  /// `targets`: every file it may write, its report among them. @throws as Outputs.
+  /// `more`: files it may write besides OUT and the report. @throws as Outputs.
   Job(const std::string& command, const Recipe& recipe, const ModelOptions& model, const RunOptions& run,
-      const std::vector<std::filesystem::path>& targets);
+      const OutputOptions& output, const std::vector<std::filesystem::path>& more = {});
 
   Report report;
+  const std::filesystem::path report_path;
+  const std::vector<std::filesystem::path> targets;  ///< Every file it may write, the report last.
   Outputs outputs;
   [[nodiscard]] const Context& context() const { return terminal_.context(); }
   /// Write the report and put every output in its place. @throws Error Io, Cancelled; then none of them is there.
-  void finish(const std::filesystem::path& report_path);
+  void finish();
 
  private:
   const ThreadLimit threads_;

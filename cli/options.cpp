@@ -121,12 +121,6 @@ double RunOptions::allowed_bytes() const {
   return bytes;
 }
 
-fs::path OutputOptions::report_path() const {
-  if (report) return *report;
-  fs::path path = files.front();
-  return path.replace_extension(".report.json");
-}
-
 void add_options(CLI::App& command, ModelOptions& options) {
   command.add_option("MODEL", options.path, "Model: .stl .obj .ply .off .3mf, or a level set in .vdb")->required();
   add_positive(command, "--size", options.prepare.size_mm, "Scale so that the longest side is this long")
@@ -195,7 +189,10 @@ void add_options(CLI::App& command, OutputOptions& options, const std::vector<st
       ->type_name("OUT")
       ->allow_extra_args(false)
       ->each([endings](const std::string& file) { require_ending("-o", file, endings); });
-  command.add_option("--report", options.report, "Report (default: the first OUT with .report.json)")
+  command
+      .add_option("--report", options.report,
+                  "Report (default: OUT.report.json for the first OUT, without its ending unless another "
+                  "output has its report there)")
       ->type_name("FILE.json");
 }
 

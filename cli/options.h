@@ -42,9 +42,7 @@ struct RunOptions {
 /// Where results go.
 struct OutputOptions {
   std::vector<std::filesystem::path> files;
-  std::optional<std::filesystem::path> report;
-  /// --report, else the first output with the ending .report.json.
-  [[nodiscard]] std::filesystem::path report_path() const;
+  std::optional<std::filesystem::path> report;  ///< --report.
 };
 
 // Bad values throw UsageError while the command line is parsed.

@@ -58,7 +58,7 @@ Outputs::Outputs(const std::vector<fs::path>& targets, const fs::path& model, bo
         throw UsageError("two outputs have the same name", asked.string(), "choose another name for one");
     if (exists && !overwrite)
       throw Error(Code::Io, "the output exists", asked.string(),
-                  "use --overwrite to replace it, or choose another name");
+                  "use --overwrite to replace it, or choose another name (a report's by --report)");
     static_cast<void>(OutputFile(target));  // throws if the folder is missing or nothing can be written there
     items_.push_back({asked, target, hidden_name(target), exists});
     names->push_back(fs::absolute(items_.back().hidden, error).string());

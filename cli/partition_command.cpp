@@ -98,10 +98,8 @@ std::vector<NamedSolid> grids(const Solid& body, const Partition& parts, const C
 void run_partition(const PartitionOptions& options) {
   Recipe recipe = options.recipe.load();
   recipe.verify.up = direction(options.model.up);
-  std::vector<fs::path> targets = options.output.files;
-  targets.push_back(options.output.report_path());
 
-  Job job("partition", recipe, options.model, options.run, targets);
+  Job job("partition", recipe, options.model, options.run, options.output);
   const Context& context = job.context();
   Outputs& outputs = job.outputs;
   Report& report = job.report;
@@ -129,8 +127,8 @@ void run_partition(const PartitionOptions& options) {
       }
     }
   });
-  job.finish(options.output.report_path());
-  if (!options.run.quiet) print_parts(report, targets);
+  job.finish();
+  if (!options.run.quiet) print_parts(report, job.targets);
 }
 
 }  // namespace

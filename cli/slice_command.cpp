@@ -34,11 +34,6 @@ struct SliceOptions {
   bool tile = false, resume = false;
   int planes = 1;
 
-  [[nodiscard]] std::vector<fs::path> targets() const {
-    std::vector<fs::path> all = output.files;
-    all.push_back(output.report_path());
-    return all;
-  }
   [[nodiscard]] bool from_solid() const { return model.path.extension() == ".vdb" || model.path.extension() == ".VDB"; }
 };
 
@@ -214,7 +209,7 @@ void slice_to_files(const SliceOptions& options) {
   params.recipe.verify.up = direction(options.model.up);
   params.infill = options.infill;
   params.function = true;
-  Job job("slice", params.recipe, options.model, options.run, options.targets());
+  Job job("slice", params.recipe, options.model, options.run, options.output);
   const Context& context = job.context();
   Report& report = job.report;
   Stopwatch stage(report.stages);
@@ -307,9 +302,9 @@ void slice_to_files(const SliceOptions& options) {
     report.warnings.push_back("the layers add up to " + number_text(volume_mm3) + " mm3, the solid has " +
                               number_text(solid_mm3) + " mm3: use thinner layers or smaller pixels or voxels");
   }
-  job.finish(options.output.report_path());
+  job.finish();
   if (resume) resume->done();
-  if (!options.run.quiet) print_layers(report, options.targets());
+  if (!options.run.quiet) print_layers(report, job.targets);
 }
 
 }  // namespace

@@ -86,9 +86,7 @@ void run_verify(const VerifyOptions& options) {
   Recipe recipe = options.recipe.load();
   recipe.verify.up = direction(options.model.up);
   recipe.verify.keep_field = true;
-  std::vector<fs::path> targets = options.output.files;
-  targets.push_back(options.output.report_path());
-  Job job("verify", recipe, options.model, options.run, targets);
+  Job job("verify", recipe, options.model, options.run, options.output);
   const Context& context = job.context();
   Report& report = job.report;
   Stopwatch stage(report.stages);
@@ -111,8 +109,8 @@ void run_verify(const VerifyOptions& options) {
       if (!deck) write_vtu(job.outputs.place(file), field, context);
     }
   });
-  job.finish(options.output.report_path());
-  if (!options.run.quiet) print_parts(report, targets);
+  job.finish();
+  if (!options.run.quiet) print_parts(report, job.targets);
 }
 
 }  // namespace

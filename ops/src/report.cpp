@@ -266,6 +266,7 @@ std::string to_json(const Report& report) {
       {"schema", 1},
       {"version", version()},
       {"command", report.command},
+      {"formats", report.formats},
       {"infill", report.infill},
       {"recipe", Json::parse(to_json(with_joint_lengths(report.recipe)))},
       {"model", to_json(report.model)},

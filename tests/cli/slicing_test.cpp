@@ -131,6 +131,44 @@ TEST(Slicing, ADryRunOnlySays) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre("cube.stl"));
 }
 
+/// Mesh and layers of one model have the same name but for the ending: each has its report, and neither is lost.
+TEST(Slicing, TheReportOfAnotherOutputStays) {
+  const TempDir folder;
+  write_mesh(folder / "cube.stl", cube(20));
+  const auto made = [&](const char* command, const char* output, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{command, folder / "cube.stl", "--infill", "solid", "--voxel", "0.5"};
+    arguments.insert(arguments.end(), {"-o", folder / output});
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  const std::vector<std::string> layers{"--layer", "2", "--pixel", "1"};
+  run(made("generate", "part.ply", {}));
+  const std::string report = content(folder / "part.report.json");
+  EXPECT_EQ(json::parse(report)["formats"], json({"ply"}));
+  EXPECT_THAT(run(made("slice", "part.zip", layers)).out, HasSubstr("part.zip.report.json"));
+  EXPECT_EQ(content(folder / "part.report.json"), report);
+  EXPECT_EQ(report_in(folder / "part.zip.report.json")["command"], "slice");
+  run(made("generate", "part.OBJ", {}));
+  EXPECT_EQ(content(folder / "part.report.json"), report);
+
+  // Its own is refused as ever, and replaced where it is.
+  EXPECT_EQ(run_program(FIBROLITE_PROGRAM, made("slice", "part.zip", layers)).code, 7);
+  fs::remove(folder / "part.zip");
+  EXPECT_EQ(run_program(FIBROLITE_PROGRAM, made("slice", "part.zip", layers)).code, 7);
+  std::vector<std::string> finer{"--layer", "1", "--pixel", "1", "--overwrite"};
+  run(made("slice", "part.zip", finer));
+  EXPECT_EQ(report_in(folder / "part.zip.report.json")["slices"]["plates"][0]["layers"], 20);
+  EXPECT_EQ(content(folder / "part.report.json"), report);
+  fs::remove(folder / "part.ply");
+  EXPECT_EQ(run_program(FIBROLITE_PROGRAM, made("generate", "part.ply", {})).code, 7);
+
+  // Who asks for it has the plain name.
+  run(made("slice", "part.cli", finer));
+  EXPECT_EQ(report_in(folder / "part.report.json")["command"], "slice");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("cube.stl", "part.OBJ", "part.OBJ.report.json", "part.cli",
+                                                   "part.report.json", "part.zip", "part.zip.report.json"));
+}
+
 enum { Usage = 2, BadModel = 3, OutOfMemory = 5, NoOutput = 7 };
 
 class SlicingRefused : public ::testing::Test {

@@ -123,6 +123,7 @@ struct PlateReport {
 };
 struct Report {
   std::string command;
+  std::vector<std::string> formats;  ///< Of the outputs, in their order: "stl", "vdb".
   Recipe recipe;
   std::string infill = "hybrid";
   int threads = 0;  ///< 0: not known.
