@@ -146,9 +146,10 @@ void generate(const GenerateOptions& options) {
   params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
   check_recipe(params.recipe, *params.voxel_mm, options.infill);
   const int axis = longest_axis(bounds(model.mesh));
-  params.slabs = fit_into_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
-                                 {.axis = axis, .margin_mm = 8 * *params.voxel_mm, .surface = true}, 0,
-                                 options.needs_whole(params.recipe));
+  params.slabs = fit_into_memory(
+      model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
+      [&](double voxel_mm) { return SlabNeeds{.axis = axis, .margin_mm = 8 * voxel_mm, .surface = true}; }, 0,
+      options.needs_whole(params.recipe));
   if (options.run.dry_run) return print(plan(options, model, params, job.report_path));
 
   // Each thing goes as soon as nothing needs it: at the end only the surface and its check are in memory.

@@ -27,10 +27,10 @@ MeshFile read_model(const std::filesystem::path& path, const Context& context) {
   return read_mesh(path, context);
 }
 
-/// To two significant digits.
-double round_up(double value) {
-  const double step = std::pow(10.0, std::floor(std::log10(value)) - 1);
-  return std::ceil(value / step) * step;
+/// As --max-memory takes it, no less.
+std::string memory_option(double bytes) {
+  constexpr double mb = 1024.0 * 1024, gb = 1024 * mb;
+  return bytes < gb ? number_text(rounded_up(bytes / mb, 2)) + "M" : number_text(rounded_up(bytes / gb, 2)) + "G";
 }
 
 }  // namespace
@@ -50,45 +50,55 @@ Model load_model(const ModelOptions& options, Report& report, const Context& con
 
 namespace {
 
-/// `needed`: bytes, by voxel; `why` follows what is said of them.
-[[noreturn]] void refuse(const Mesh& model, double voxel_mm, const std::function<double(double)>& needed,
+/// `needed`: bytes, by voxel; `why` follows what is said of them. `most`: the coarsest voxel that the recipe allows.
+[[noreturn]] void refuse(const Mesh& model, double voxel_mm, double most, const std::function<double(double)>& needed,
                          double allowed, const std::string& why) {
   const std::string what = "the run would need about " + memory_text(needed(voxel_mm)) + " of memory, more than " +
                            memory_text(allowed) + why;
-  const double coarsest = bounds(model).longest_side();
+  const double side = bounds(model).longest_side(), coarsest = std::min(side, most);
+  // Slabs are whole layers of blocks thick: what a slightly larger voxel needs may be a little more.
+  const auto fits = [&](double voxel) { return needed(voxel) <= allowed && needed(1.1 * voxel) <= allowed; };
   double fitting = voxel_mm;
-  while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting *= 2;
+  while (!fits(fitting) && fitting < coarsest) fitting *= 2;
   fitting = std::max(voxel_mm, fitting / 2);
-  while (!(needed(fitting) <= allowed) && fitting < coarsest) fitting = round_up(fitting * 1.05);
-  const std::string unit = is_odd_size(coarsest) ? "is the model's unit right? It is " + number_text(coarsest, 6) +
-                                                       " mm long: try --unit or --size, or "
-                                                 : "";
-  throw Error(Code::TooLarge, what, "voxel " + number_text(voxel_mm) + " mm",
-              unit + (fitting < coarsest ? "use --voxel " + number_text(fitting) + " or larger, or raise --max-memory"
-                                         : "raise --max-memory"));
+  while (!fits(fitting) && fitting < coarsest) fitting = rounded_up(fitting * 1.05, 2);
+  std::string remedy = is_odd_size(side) ? "is the model's unit right? It is " + number_text(side, 6) +
+                                               " mm long: try --unit or --size, or "
+                                         : "";
+  fitting = std::min(fitting, coarsest);
+  if (needed(fitting) <= allowed)
+    remedy += "use --voxel " + number_text(fitting) + (fitting < most ? " or larger" : "") + ", or raise --max-memory";
+  else if (fitting == most && needed(most) < 1e18)
+    remedy += "raise --max-memory to " + memory_option(needed(most)) + " and use --voxel " + number_text(most) +
+              ", the coarsest for this recipe";
+  else
+    remedy += "raise --max-memory";
+  throw Error(Code::TooLarge, what, "voxel " + number_text(voxel_mm) + " mm", remedy);
 }
 
 }  // namespace
 
 void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run) {
   const auto needed = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes; };
-  if (!(needed(voxel_mm) <= run.allowed_bytes())) refuse(model, voxel_mm, needed, run.allowed_bytes(), "");
+  if (!(needed(voxel_mm) <= run.allowed_bytes()))
+    refuse(model, voxel_mm, most_voxel_mm(recipe, infill), needed, run.allowed_bytes(), "");
 }
 
 std::optional<SlabPlan> fit_into_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill,
-                                        const RunOptions& run, const SlabNeeds& needs, double more_bytes,
-                                        const std::string& whole) {
-  const double allowed = run.allowed_bytes();
+                                        const RunOptions& run, const std::function<SlabNeeds(double)>& needs,
+                                        double more_bytes, const std::string& whole) {
+  const double allowed = run.allowed_bytes(), most = most_voxel_mm(recipe, infill);
   const auto as_whole = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes + more_bytes; };
   if (as_whole(voxel_mm) <= allowed) return std::nullopt;
-  if (!whole.empty()) refuse(model, voxel_mm, as_whole, allowed, ", and " + whole + " needs the whole solid in it");
+  if (!whole.empty())
+    refuse(model, voxel_mm, most, as_whole, allowed, ", and " + whole + " needs the whole solid in it");
   const auto plan_of = [&](double voxel) {
-    return plan_slabs(model, voxel, recipe, infill, needs, allowed - more_bytes);
+    return plan_slabs(model, voxel, recipe, infill, needs(voxel), allowed - more_bytes);
   };
   SlabPlan plan = plan_of(voxel_mm);
   if (plan.memory_bytes + more_bytes > allowed) {
     const auto in_slabs = [&](double voxel) { return plan_of(voxel).memory_bytes + more_bytes; };
-    refuse(model, voxel_mm, in_slabs, allowed, " even slab by slab");
+    refuse(model, voxel_mm, most, in_slabs, allowed, " even slab by slab");
   }
   return plan;
 }

@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -23,12 +24,14 @@ namespace fibrolite::cli {
 /// @throws Error TooLarge, before anything is allocated, if the run would need more than it may use.
 void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run);
 
-/// Slab by slab, if the run would need more memory than it may use as a whole. `more_bytes`: taken beside the solid.
+/// Slab by slab, if the run would need more memory than it may use as a whole. `needs`: of slabs, by voxel.
+/// `more_bytes`: taken beside the solid.
 /// `whole`: what asks for all of it in memory; empty if nothing does.
 /// @throws Error TooLarge, before anything is allocated, if it does not fit either way.
 [[nodiscard]] std::optional<SlabPlan> fit_into_memory(const Mesh& model, double voxel_mm, const Recipe& recipe,
-                                                      InfillKind infill, const RunOptions& run, const SlabNeeds& needs,
-                                                      double more_bytes, const std::string& whole);
+                                                      InfillKind infill, const RunOptions& run,
+                                                      const std::function<SlabNeeds(double)>& needs, double more_bytes,
+                                                      const std::string& whole);
 
 /// What decides by shape: proxy, diameter and partition as stages of the report, seen as the model stands under its
 /// load (proxy.frame); to be placed in the world.

@@ -92,7 +92,7 @@ void check_plates(const SliceOptions& options, const std::vector<SlicePlate>& pl
         "the run would need about " + memory_text(needed) + " of memory, more than " +
             memory_text(options.run.allowed_bytes()),
         std::to_string(plates.front().grid.width) + " x " + std::to_string(plates.front().grid.height) + " pixels",
-        "use a larger --pixel or --voxel, or raise --max-memory");
+        "use a larger --pixel, or raise --max-memory");
   }
 }
 
@@ -248,10 +248,10 @@ void slice_to_files(const SliceOptions& options) {
                   {options.layer_mm.value_or(0.05), options.pixel_mm.value_or(0.05), options.printer, options.tile});
   check_plates(options, plates, source.memory);
   if (!options.from_solid()) {
-    params.slabs = fit_into_memory(model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
-                                   needs_of_layers(options.model.up, options.layer_mm.value_or(0.05), *params.voxel_mm),
-                                   slicing_memory(plates.front().grid),
-                                   params.recipe.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "");
+    params.slabs = fit_into_memory(
+        model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
+        [&](double voxel_mm) { return needs_of_layers(options.model.up, options.layer_mm.value_or(0.05), voxel_mm); },
+        slicing_memory(plates.front().grid), params.recipe.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "");
     source.slabs = params.slabs;
     source.memory = params.slabs ? params.slabs->memory_bytes
                                  : predict(model.mesh, *params.voxel_mm, params.recipe, options.infill).memory_bytes;

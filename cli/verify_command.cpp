@@ -86,6 +86,7 @@ void run_verify(const VerifyOptions& options) {
   Recipe recipe = options.recipe.load();
   recipe.verify.up = direction(options.model.up);
   recipe.verify.keep_field = true;
+  if (options.solid) check_recipe(recipe, options.voxel_mm.value_or(0), options.infill);
   Job job("verify", recipe, options.model, options.run, options.output);
   const Context& context = job.context();
   Report& report = job.report;

@@ -3,6 +3,7 @@
 #include "fibrolite/ops/recipe.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "fibrolite/error.h"
@@ -74,6 +75,14 @@ std::vector<Feature> features(const Recipe& recipe, InfillKind infill) {
   return list;
 }
 
+/// The same and what is cut: all that must be two voxels thick.
+std::vector<Feature> sampled(const Recipe& recipe, InfillKind infill) {
+  std::vector<Feature> list = features(recipe, infill);
+  if (const double drain_mm = recipe.print.drain_mm.value_or(0); drain_mm > 0)
+    list.push_back({"print.drain_mm", drain_mm});
+  return list;
+}
+
 constexpr double rounding = 1 - 1e-9;  // 0.8 mm at a voxel of 0.4 mm is two voxels, whatever the last bit says
 
 [[noreturn]] void unfit(const std::string& what, const std::string& where, const std::string& hint) {
@@ -139,6 +148,24 @@ void check_joint(const JointParams& joint, double wall_mm) {
           "use more than " + number_text(joint.column_mm) + " (joint.column_mm)");
 }
 
+/// All that is too thin at once: who does what the message says is not refused for the next.
+void check_sampled(const Recipe& recipe, double voxel_mm, InfillKind infill) {
+  const double least = 2 * voxel_mm;
+  std::vector<Feature> thin = sampled(recipe, infill);
+  std::erase_if(thin, [&](const Feature& feature) { return feature.mm >= least * rounding; });
+  if (thin.empty()) return;
+  std::string what;
+  for (const Feature& feature : thin)
+    what.append(what.empty() ? "" : ", ")
+        .append(feature.key)
+        .append(std::string_view(feature.key).ends_with(".density") ? " makes members of " : " is ")
+        .append(number_text(feature.mm))
+        .append(" mm");
+  unfit(what + ": thinner than 2 voxels", "voxel " + number_text(voxel_mm) + " mm",
+        "use " + number_text(rounded_up(least)) + " mm or more" + (thin.size() > 1 ? " for each" : "") +
+            ", or --voxel " + number_text(most_voxel_mm(recipe, infill)) + " or less");
+}
+
 }  // namespace
 
 std::vector<std::string> preset_names() {
@@ -201,20 +228,13 @@ void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill) {
   if (infill == InfillKind::Gyroid) (void)density(recipe.gyroid);
   if (hybrid && recipe.joint.enabled) check_joint(joint_params(recipe), recipe.print.wall_mm);
 
-  const double drain_mm = recipe.print.drain_mm.value_or(0);
-  if (drain_mm > 0 && drain_mm < 2 * voxel_mm * rounding)
-    unfit("print.drain_mm is " + number_text(drain_mm) + " mm, narrower than 2 voxels",
-          "voxel " + number_text(voxel_mm) + " mm",
-          "use " + number_text(2 * voxel_mm) + " or more, or a smaller --voxel");
+  check_sampled(recipe, voxel_mm, infill);
+}
 
-  for (const Feature& feature : features(recipe, infill))
-    if (feature.mm < 2 * voxel_mm * rounding)
-      unfit(std::string(feature.key)
-                .append(std::string_view(feature.key).ends_with(".density") ? " makes members of " : " is ")
-                .append(number_text(feature.mm))
-                .append(" mm, thinner than 2 voxels"),
-            "voxel " + number_text(voxel_mm) + " mm",
-            "use " + number_text(2 * voxel_mm) + " or more, or --voxel " + number_text(feature.mm / 2) + " or less");
+double most_voxel_mm(const Recipe& recipe, InfillKind infill) {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (const Feature& feature : sampled(recipe, infill)) thinnest = std::min(thinnest, feature.mm);
+  return std::isfinite(thinnest) ? rounded_down(thinnest / 2) : thinnest;
 }
 
 }  // namespace fibrolite

@@ -114,7 +114,7 @@ void report_necks(double thinnest_mm, Grid grid, const PrintParams& limits, Repo
   if (grid.voxel_mm < voxel)
     remedy = "use a coarser --voxel";
   else if (voxel > 0)
-    remedy = "use --voxel " + number_text(std::floor(1e3 * voxel) / 1e3) + " or less";
+    remedy = "use --voxel " + number_text(rounded_down(voxel)) + " or less";
   report.warnings.push_back("solid.neck_mm: necks were looked for below " + number_text(told, 2) +
                             " mm only, which is thinner than print.wall_mm, " + number_text(limits.wall_mm) + " mm; " +
                             remedy);

@@ -3,12 +3,23 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <limits>
 
 namespace fibrolite {
 namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+/// What one is of the last of so many significant digits.
+double last_digit(double value, int digits) { return std::pow(10.0, std::floor(std::log10(value)) + 1 - digits); }
+constexpr double last_bits = 1e-10;  // 0.4 is a number of three digits, whatever its last bits say
+/// To the last bit the number that one reads: 23 * 0.001 is not 0.023.
+double as_read(double value, int digits) {
+  const std::string text = number_text(value, digits);
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
+}
 
 }  // namespace
 
@@ -47,6 +58,16 @@ std::string number_text(double value, int digits) {
   char buffer[40];
   const auto end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general, digits).ptr;
   return {buffer, end};
+}
+
+double rounded_down(double value, int digits) {
+  const double step = last_digit(value, digits);
+  return as_read(std::floor(value / step * (1 + last_bits)) * step, digits);
+}
+
+double rounded_up(double value, int digits) {
+  const double step = last_digit(value, digits);
+  return as_read(std::ceil(value / step * (1 - last_bits)) * step, digits);
 }
 
 }  // namespace fibrolite

@@ -226,6 +226,60 @@ TEST_F(BadInput, SticksThinnerThanTwoVoxels) {
   EXPECT_THAT(refused_option({"--voxel", "0.25", "--set", "tcs.stick_mm=0.4"}, BadRecipe), HasSubstr("tcs.stick_mm"));
 }
 
+/// The number after a word of a message.
+std::string proposed(const std::string& message, const std::string& word) {
+  const auto at = message.rfind(word + " ");
+  if (at == std::string::npos) return {};
+  const auto from = at + word.size() + 1;
+  return message.substr(from, message.find_first_of(" ,\n", from) - from);
+}
+TEST_F(BadInput, WhatAMessageProposesIsTaken) {
+  using Options = std::vector<std::string>;
+  const fs::path cut = models / "small.stl";
+  write_mesh(cut, cube(20));
+  const std::vector<Options> all{
+      {"--voxel", "0.6", "--set", "shell.thickness_mm=1.1"},
+      {"--voxel", "0.5", "--set", "shell.thickness_mm=0.9", "--set", "mfs.wall_mm=0.7777777"},
+      {"--voxel", "0.5", "--infill", "tcs", "--set", "tcs.density=0.0712345"},
+      {"--voxel", "0.5", "--infill", "gyroid", "--set", "gyroid.density=0.0612345"},
+      {"--voxel", "0.4", "--set", "print.drain_mm=0.6543217"},
+      {"--voxel", "0.4", "--infill", "solid", "--set", "print.drain_mm=0.6543217"},
+      {"--voxel", "0.01", "--max-memory", "500M"},
+      {"--voxel", "0.1", "--max-memory", "100M"},
+      {"--voxel", "0.05", "--max-memory", "60M", "--picture", outputs / "out.png"},
+      {"--voxel", "0.05", "--max-memory", "50M"},
+  };
+  for (const char* command : {"generate", "slice"}) {
+    for (const Options& options : all) {
+      const bool meshes_only = options.size() > 4 && options[4] == "--picture";
+      if (command == std::string("slice") && meshes_only) continue;
+      Options arguments{command, cut, "-o", outputs / (command == std::string("slice") ? "out.zip" : "out.stl")};
+      if (command == std::string("slice")) arguments.insert(arguments.end(), {"--layer", "1", "--pixel", "1"});
+      arguments.insert(arguments.end(), options.begin(), options.end());
+      arguments.emplace_back("--dry-run");
+      const Finished first = run_program(FIBROLITE_PROGRAM, arguments);
+      expect_refused(first, options[2] == "--max-memory" ? OutOfMemory : BadRecipe);
+      for (const auto& [option, word] :
+           {std::pair("--voxel", "use --voxel"), {"--voxel", "or --voxel"}, {"--max-memory", "--max-memory to"}}) {
+        const std::string value = proposed(first.err, word);
+        if (!value.empty()) *(std::find(arguments.begin(), arguments.end(), option) + 1) = value;
+      }
+      const Finished second = run_program(FIBROLITE_PROGRAM, arguments);
+      EXPECT_EQ(second.code, Done) << first.err << second.err;
+    }
+  }
+  // The lengths that it asks for instead do too.
+  const std::string message = refused_option({"--voxel", "0.5123456"}, BadRecipe), least = proposed(message, "use");
+  Options longer{"--voxel", "0.5123456", "--dry-run", "--set", "tcs.cell_mm=9", "--set", "tcs.ball_mm=2"};
+  for (const char* key :
+       {"shell.thickness_mm", "tcs.stick_mm", "tcs.wall_mm", "mfs.wall_mm", "joint.column_mm", "joint.min_wall_mm"}) {
+    if (message.find(key) == std::string::npos) continue;
+    longer.insert(longer.end(), {"--set", std::string(key) + "=" + least});
+  }
+  longer.insert(longer.begin(), {"generate", good_model(), "-o", outputs / "out.stl"});
+  EXPECT_EQ(run(longer).code, Done) << message;
+}
+
 // ---- memory
 
 TEST_F(BadInput, AVoxelTooSmallForTheMemory) {

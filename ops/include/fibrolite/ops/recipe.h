@@ -82,6 +82,8 @@ struct RecipeKey {
 /// that everything `infill` makes is at least two voxels thick. A voxel of 0 checks the first alone. Only features that
 /// `infill` uses matter. @throws Error BadRecipe, naming the key.
 void check_recipe(const Recipe& recipe, double voxel_mm, InfillKind infill = InfillKind::Hybrid);
+/// The coarsest voxel that check_recipe() lets pass, mm, to three digits; infinity if any does.
+[[nodiscard]] double most_voxel_mm(const Recipe& recipe, InfillKind infill);
 /// What find_cores() needs to know: numbers of the partition, and a diameter that holds two fibres and a wall around.
 [[nodiscard]] CoreParams core_params(const Recipe& recipe);
 /// The thinnest feature that `infill` makes, mm; infinity if it makes none.

@@ -16,5 +16,9 @@ namespace fibrolite {
 
 /// Up to `digits` significant digits, 1 to 17: 0.8, 1.25e-07, nan.
 [[nodiscard]] std::string number_text(double value, int digits = 6);
+/// The nearest number of so many significant digits that is no more, or no less, than a positive value: for what a
+/// message proposes, which must hold when it is typed as it reads.
+[[nodiscard]] double rounded_down(double value, int digits = 3);
+[[nodiscard]] double rounded_up(double value, int digits = 3);
 
 }  // namespace fibrolite
