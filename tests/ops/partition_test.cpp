@@ -223,6 +223,31 @@ TEST(Partition, AYIsThreeLimbs) {
   }
 }
 
+/// A trunk down from the origin and two arms up, each leaning so many degrees, turned by a frame.
+Shape leaning_y(double degrees, const Frame& turn) {
+  const double lean = degrees * std::numbers::pi / 180, x = 56 * std::sin(lean), z = 56 * std::cos(lean);
+  const auto at = [&](Vec3d p) { return turn.to_world(p); };
+  const Shape arms = unite({capsule(at({}), at({x, 0, z}), 8), capsule(at({}), at({-x, 0, z}), 8)});
+  return smooth_unite(capsule(at({}), at({0, 0, -64}), 9.5), arms, 5);
+}
+
+/// Whether a trunk runs straight on into an arm is not decided by where a level set happens to pass the fork: the limit
+/// is a lean of 32 degrees.
+TEST(Partition, AForkIsJudgedAlikeHoweverItIsTurned) {
+  Random random(1, "forks", 0);
+  const auto unit = [&] { return 2 * random.uniform() - 1; };
+  const auto limbs = [](const Shape& shape) {
+    return parted(shape, Box3d{{-80, -80, -80}, {80, 80, 80}}, 1.6).partition.candidates.size();
+  };
+  for (int turn = 0; turn < 10; ++turn) {
+    const Frame frame = frame_along({}, {unit(), unit(), unit() + 0.01});
+    EXPECT_EQ(limbs(leaning_y(34.5, frame)), 3U) << turn;
+    if (turn % 3 == 0) {
+      EXPECT_EQ(limbs(leaning_y(29.5, frame)), 2U) << turn;
+    }
+  }
+}
+
 TEST(Partition, ABarThatRunsOnKeepsItsSideBranchOff) {
   const Shape t = unite({capsule({-40, 0, 0}, {40, 0, 0}, 6), capsule({}, {0, 0, 45}, 6)});
   const Parted p = parted(t, Box3d{{-48, -8, -8}, {48, 8, 53}}, 1.2);
