@@ -69,8 +69,9 @@ namespace {
   if (needed(fitting) <= allowed)
     remedy += "use --voxel " + number_text(fitting) + (fitting < most ? " or larger" : "") + ", or raise --max-memory";
   else if (fitting == most && needed(most) < 1e18)
-    remedy += "raise --max-memory to " + memory_option(needed(most)) + " and use --voxel " + number_text(most) +
-              ", the coarsest for this recipe";
+    remedy += "raise --max-memory to " + memory_option(needed(most)) +
+              (voxel_mm < most ? " and use --voxel " + number_text(most) : "") +
+              ", use a smaller --size, or a recipe of thicker members";
   else
     remedy += "raise --max-memory";
   throw Error(Code::TooLarge, what, "voxel " + number_text(voxel_mm) + " mm", remedy);

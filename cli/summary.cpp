@@ -82,8 +82,9 @@ std::string print_line(const PrintReport& print, const PrintParams& limits) {
   const Printable& found = print.found;
   std::string text = "print     " + counted(found.thin_walls.places, "place") + " thinner than ";
   text += measured(limits.wall_mm) + " mm, " + counted(found.small_gaps.places, "gap") + " below ";
-  text += measured(limits.gap_mm) + " mm, " + share(found.overhangs.area_mm2, found.lumen_mm2);
-  text += " of the faces inside overhang";
+  text += measured(limits.gap_mm) + " mm";
+  if (found.lumen_mm2 > 0)
+    text += ", " + share(found.overhangs.area_mm2, found.lumen_mm2) + " of the faces inside overhang";
   if (!print.drains.empty()) text += ", " + counted(static_cast<std::int64_t>(print.drains.size()), "drain hole");
   return text + "\n";
 }

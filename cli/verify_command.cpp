@@ -82,7 +82,13 @@ StressField judge_solid(const VerifyOptions& options, const Model& model, const 
   return std::move(hybrid.field);
 }
 
-void run_verify(const VerifyOptions& options) {
+/// Options that matter to the printed solid alone are not ignored without a word.
+void note_unused(const CLI::App& command, std::vector<std::string>& warnings) {
+  for (const char* option : {"--infill", "--voxel", "--coarsen"})
+    if (command.count(option) > 0) warnings.push_back(std::string(option) + " changes nothing without --solid");
+}
+
+void run_verify(const VerifyOptions& options, const CLI::App& command) {
   Recipe recipe = options.recipe.load();
   recipe.verify.up = direction(options.model.up);
   recipe.verify.keep_field = true;
@@ -91,6 +97,7 @@ void run_verify(const VerifyOptions& options) {
   const Context& context = job.context();
   Report& report = job.report;
   Stopwatch stage(report.stages);
+  if (!options.solid) note_unused(command, report.warnings);
 
   const Model model = load_model(options.model, report, context.part(0, 0.1, "read"));
   report.model.volume_mm3 = signed_volume(model.mesh);
@@ -132,7 +139,7 @@ void add_verify_command(CLI::App& program) {
       ->check(CLI::IsMember({1, 2, 4}));
   add_options(command, options->recipe);
   add_options(command, options->run);
-  command.callback([options] { run_verify(*options); });
+  command.callback([options, &command] { run_verify(*options, command); });
 }
 
 }  // namespace fibrolite::cli

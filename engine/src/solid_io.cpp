@@ -19,7 +19,9 @@
 #include <ostream>
 #include <span>
 #include <streambuf>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "fibrolite/error.h"
 #include "fibrolite/file.h"
@@ -271,6 +273,29 @@ void check_values(const std::filesystem::path& path, const FloatGrid& grid) {
                   "is it a level set?");
 }
 
+FloatGrid::Ptr chosen_grid(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
+                           const std::string& name) {
+  constexpr const char* usual_name = "solid";
+  std::vector<FloatGrid::Ptr> found;
+  std::string names;
+  for (const openvdb::GridBase::Ptr& base : grids) {
+    names += " '" + base->getName() + "'";
+    const auto grid = openvdb::gridPtrCast<FloatGrid>(base);
+    if (grid && grid->getGridClass() == openvdb::GRID_LEVEL_SET && (name.empty() || grid->getName() == name))
+      found.push_back(grid);
+  }
+  if (found.empty())
+    throw Error(Code::BadInput,
+                name.empty() ? "the .vdb file has no level set" : "the .vdb file has no level set '" + name + "'",
+                path.string(), names.empty() ? "" : "its grids are" + names);
+  if (found.size() == 1 || !name.empty()) return found.front();
+  for (const FloatGrid::Ptr& grid : found)
+    if (grid->getName() == usual_name) return grid;
+  throw Error(Code::BadInput,
+              "the .vdb file has " + std::to_string(found.size()) + " level sets and none is called 'solid':" + names,
+              path.string(), "give a file that holds the one that is meant");
+}
+
 }  // namespace
 
 void write_vdb(const std::filesystem::path& path, const std::vector<NamedSolid>& solids, const Context& context) {
@@ -306,32 +331,23 @@ Solid read_vdb(const std::filesystem::path& path, const std::string& name) {
     check_bytes(path, bytes.view());
     grids = read_grids(path, bytes.view());
   }
-  std::string others;
-  for (const openvdb::GridBase::Ptr& base : *grids) {
-    const auto grid = openvdb::gridPtrCast<FloatGrid>(base);
-    others += " '" + base->getName() + "'";
-    if (!grid || grid->getGridClass() != openvdb::GRID_LEVEL_SET || (!name.empty() && grid->getName() != name))
-      continue;
-    Solid solid;
-    try {
-      solid = from_vdb(grid);
-    } catch (const Error& error) {
-      throw Error(error.code(), error.what(), path.string());
-    }
-    check_values(path, *grid);
-    if (grid->getMetadata<openvdb::Int64Metadata>(Facts::checksum_key)) {
-      bool agree = false;
-      try {
-        agree = Facts(*grid).agree(*grid);
-      } catch (const openvdb::Exception&) {  // one of the facts is missing or of another type
-      }
-      if (!agree) throw damaged(path, "the grid '" + grid->getName() + "' does not match its checksum");
-    }
-    return solid;
+  const FloatGrid::Ptr grid = chosen_grid(path, *grids, name);
+  Solid solid;
+  try {
+    solid = from_vdb(grid);
+  } catch (const Error& error) {
+    throw Error(error.code(), error.what(), path.string());
   }
-  throw Error(Code::BadInput,
-              name.empty() ? "the .vdb file has no level set" : "the .vdb file has no level set '" + name + "'",
-              path.string(), others.empty() ? "" : "its grids are" + others);
+  check_values(path, *grid);
+  if (grid->getMetadata<openvdb::Int64Metadata>(Facts::checksum_key)) {
+    bool agree = false;
+    try {
+      agree = Facts(*grid).agree(*grid);
+    } catch (const openvdb::Exception&) {  // one of the facts is missing or of another type
+    }
+    if (!agree) throw damaged(path, "the grid '" + grid->getName() + "' does not match its checksum");
+  }
+  return solid;
 }
 
 }  // namespace fibrolite

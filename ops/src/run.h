@@ -112,6 +112,8 @@ void report_parts(const Parts& parts, const std::vector<Fill>& fills, const std:
 /// `demand_n`: one per interface.
 void report_joints(const std::vector<Interface>& interfaces, const std::vector<Joint>& joints,
                    const std::vector<double>& demand_n, const Recipe& recipe, Report& report);
+/// A warning if the model is hardly more than a few voxels.
+void report_coarse(const Box3d& model, double voxel_mm, Report& report);
 /// Down to which thickness necks are looked for, and a warning if that is thinner than a wall may be.
 void report_necks(double thinnest_mm, Grid grid, const PrintParams& limits, Report& report);
 void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,

@@ -105,6 +105,16 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
   }
 }
 
+void report_coarse(const Box3d& model, double voxel_mm, Report& report) {
+  constexpr double least_voxels = 8;
+  const Vec3d size = model.size();
+  const double shortest = std::min({size.x, size.y, size.z});
+  if (shortest >= least_voxels * voxel_mm) return;
+  report.warnings.push_back("the model's shortest side, " + number_text(shortest, 4) + " mm, is only " +
+                            number_text(shortest / voxel_mm, 2) + " voxels: its shape is lost; use --voxel " +
+                            number_text(rounded_down(shortest / least_voxels)) + " or less");
+}
+
 void report_necks(double thinnest_mm, Grid grid, const PrintParams& limits, Report& report) {
   const double told = 2 * skin_mm(thinnest_mm, grid);
   report.solid.neck_mm = told;

@@ -24,6 +24,7 @@ using nlohmann::json;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
@@ -266,6 +267,38 @@ TEST(Generate, ALevelSetIsAModelToo) {
               0.01 * a["solid"]["volume_mm3"].get<double>());
 }
 
+TEST(Generate, ALevelSetAmongOthersIsNotTakenByChance) {
+  const TempDir folder;
+  run(generate(asset("molar"), {"--infill", "tcs", "-o", folder / "m.vdb", "--steps", folder / "steps.vdb"}));
+  const auto mesh_in = [&](const char* file) { return json::parse(run({"check", folder / file}).out)["mesh"]; };
+  EXPECT_EQ(mesh_in("steps.vdb"), mesh_in("m.vdb"));
+  run({"partition", asset("molar"), "-o", folder / "parts.vdb"});
+  const Finished parts = run_program(FIBROLITE_PROGRAM, {"check", folder / "parts.vdb"});
+  expect_refused(parts, 3);
+  EXPECT_THAT(parts.err, HasSubstr("none is called 'solid'"));
+}
+
+TEST(Generate, AVoxelThatLosesTheModelIsWarnedOf) {
+  const TempDir folder;
+  const auto warnings = [&](const char* voxel) {
+    run({"generate", asset("molar"), "--infill", "solid", "--size", "30", "--voxel", voxel, "-o", folder / "m.stl",
+         "--overwrite"});
+    return report_in(folder / "m.report.json")["warnings"].dump();
+  };
+  const std::string warned = warnings("5");
+  EXPECT_THAT(warned, HasSubstr("its shape is lost"));
+  const std::string word = "use --voxel ";
+  const auto at = warned.find(word) + word.size();
+  EXPECT_EQ(warnings(warned.substr(at, warned.find(' ', at) - at).c_str()), "[]");
+}
+
+/// There are no faces inside: no share of them is told.
+TEST(Generate, ASolidPartHasNoOverhangsInside) {
+  const TempDir folder;
+  const Finished finished = run(generate(asset("molar"), {"--infill", "solid", "-o", folder / "m.stl"}));
+  EXPECT_THAT(finished.out, Not(HasSubstr("overhang")));
+}
+
 TEST(Generate, QuietPrintsNothing) {
   const TempDir folder;
   const Finished finished = run(generate(asset("torus"), {"--infill", "tcs", "-o", folder / "a.stl", "--quiet"}));
@@ -414,6 +447,13 @@ TEST(Verify, StressesForParaViewAndADeckForCalculix) {
     EXPECT_THAT(content(folder / "v.vtu").substr(0, 4000), HasSubstr(std::string("Name=\"") + field));
   EXPECT_THAT(content(folder / "v.inp"), HasSubstr("*ELEMENT,TYPE=C3D10,ELSET=PART_1"));
   EXPECT_THAT(finished.out, HasSubstr("column"));
+}
+
+TEST(Verify, OptionsOfTheSolidAloneAreNotIgnoredWithoutAWord) {
+  const TempDir folder;
+  run({"verify", asset("cylinder_on_box"), "--size", "40", "-o", folder / "v.vtu", "--voxel", "0.3"});
+  EXPECT_THAT(report_in(folder / "v.report.json")["warnings"].dump(),
+              HasSubstr("--voxel changes nothing without --solid"));
 }
 
 TEST(Verify, ThePrintedSolidFailsSomewhere) {

@@ -59,12 +59,16 @@ TEST(SolidIo, reads_back_the_same_solid) {
 TEST(SolidIo, grids_are_found_by_name) {
   const TempDir dir;
   write_vdb(dir / "s.vdb", {{"small", ball(2)}, {"large", ball(5)}, {"nothing", Solid{}}});
-  EXPECT_EQ(read_vdb(dir / "s.vdb").volume_mm3(), ball(2).volume_mm3());
   EXPECT_EQ(read_vdb(dir / "s.vdb", "large").volume_mm3(), ball(5).volume_mm3());
   EXPECT_TRUE(read_vdb(dir / "s.vdb", "nothing").empty());
   const Error error = error_of([&] { (void)read_vdb(dir / "s.vdb", "other"); });
   EXPECT_EQ(error.code(), Code::BadInput);
   EXPECT_THAT(error.what(), HasSubstr("'small' 'large'"));
+
+  // Without a name none of several is taken by chance.
+  EXPECT_THAT(error_of([&] { (void)read_vdb(dir / "s.vdb"); }).what(), HasSubstr("3 level sets"));
+  write_vdb(dir / "t.vdb", {{"body", ball(5)}, {"solid", ball(2)}});
+  EXPECT_EQ(read_vdb(dir / "t.vdb").volume_mm3(), ball(2).volume_mm3());
 }
 
 TEST(SolidIo, the_same_grids_give_the_same_bytes) {

@@ -18,8 +18,8 @@ struct NamedSolid {
 };
 /// Voxel count, bounding box and a checksum are stored as metadata. @throws Error Io.
 void write_vdb(const std::filesystem::path& path, const std::vector<NamedSolid>& solids, const Context& context = {});
-/// The first float level-set grid (or the one called `name`). @throws Error BadInput: missing, truncated, damaged, no
-/// level set.
+/// The level set called `name`; without a name the only one there is, or among several the one called "solid".
+/// @throws Error BadInput: missing, truncated, damaged, no such level set, or several and none is called so.
 [[nodiscard]] Solid read_vdb(const std::filesystem::path& path, const std::string& name = {});
 
 }  // namespace fibrolite
