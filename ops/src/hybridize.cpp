@@ -25,6 +25,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   Recipe recipe = params.recipe;
   const double voxel = choose_voxel(bounds(model.mesh), recipe, params.infill, params.voxel_mm);
   check_recipe(recipe, voxel, params.infill);
+  check_overrides(recipe.partition.overrides, bounds(model.mesh));
   report_coarse(bounds(model.mesh), voxel, report);
   if (params.fix) report.print.stretched = stretch_to_print(recipe, params.infill);
   Run run(report, context);

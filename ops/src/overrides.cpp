@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <set>
+#include <string>
 
 #include "fibrolite/error.h"
+#include "fibrolite/ops/text.h"
 
 namespace fibrolite {
 namespace {
@@ -21,6 +23,17 @@ struct Match : Cases... {
 }
 
 bool finite(Vec3d v) { return std::isfinite(norm(v)); }
+
+Box3d box_of(const KeptRegion& region) {
+  return std::visit(Match{[](const Box3d& box) { return box; },
+                          [](const Cylinder& c) {
+                            Box3d box;
+                            box.include(c.from_mm);
+                            box.include(c.to_mm);
+                            return box.grown(c.diameter_mm / 2);
+                          }},
+                    region);
+}
 
 }  // namespace
 
@@ -65,6 +78,25 @@ void check_overrides(const Overrides& overrides) {
                          refuse("solid", i, "the cylinder has no volume", "give two ends and a diameter above 0");
                      }},
                overrides.solid[i]);
+  }
+}
+
+void check_overrides(const Overrides& overrides, const Box3d& model) {
+  const auto text = [](Vec3d p) {
+    std::string list;
+    for (const double value : {p.x, p.y, p.z}) list.append(list.empty() ? "(" : ", ").append(number_text(value, 4));
+    return list.append(")");
+  };
+  for (std::size_t i = 0; i < overrides.solid.size(); ++i) {
+    const Box3d box = box_of(overrides.solid[i]);
+    for (int axis = 0; axis < 3; ++axis)
+      if (box.min[axis] > model.max[axis] || box.max[axis] < model.min[axis])
+        refuse("solid", i, "this region lies beside the model",
+               std::string("the model reaches from ")
+                   .append(text(model.min))
+                   .append(" to ")
+                   .append(text(model.max))
+                   .append(" mm"));
   }
 }
 

@@ -68,6 +68,17 @@ TEST(Overrides, WhatCannotBeIsRefusedByName) {
   names(refused(R"({"solid": [{}]})"), "partition.overrides.solid[0]");
 }
 
+TEST(Overrides, ARegionBesideTheModelIsRefused) {
+  const Box3d model{{0, 0, 0}, {40, 40, 40}};
+  Overrides o;
+  o.solid = {Cylinder{{41, 5, 0}, {41, 5, 20}, 4}, Box3d{{30, 30, 30}, {60, 60, 60}}};
+  EXPECT_EQ(refusal([&] { check_overrides(o, model); }), "");
+  o.solid.emplace_back(Cylinder{{500, 5, 0}, {500, 5, 20}, 8});
+  const std::string message = refusal([&] { check_overrides(o, model); });
+  EXPECT_NE(message.find("partition.overrides.solid[2]"), std::string::npos) << message;
+  EXPECT_NE(message.find("(40, 40, 40)"), std::string::npos) << message;
+}
+
 TEST(Overrides, KeptSolidIsTheUnionOfItsRegions) {
   Overrides o;
   EXPECT_GT(kept_solid(o)({0, 0, 0}), 1e3F);

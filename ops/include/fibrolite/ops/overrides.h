@@ -42,6 +42,8 @@ struct Overrides {
 /// @throws Error BadRecipe, naming the entry: an empty box, a cylinder without length or diameter, a normal of no
 /// length, a radius that is no number, a part named twice.
 void check_overrides(const Overrides& overrides);
+/// @throws Error BadRecipe, naming the entry: a region that stays filled lies beside the model's box.
+void check_overrides(const Overrides& overrides, const Box3d& model);
 /// The regions that stay filled, as one shape; nothing() if there are none.
 [[nodiscard]] Shape kept_solid(const Overrides& overrides);
 
