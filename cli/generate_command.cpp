@@ -30,7 +30,6 @@ struct GenerateOptions {
   RunOptions run;
   OutputOptions output;
   std::optional<double> voxel_mm;
-  InfillKind infill = InfillKind::Hybrid;
   PictureOptions pictures;
   std::optional<fs::path> steps;
   bool fix = false;
@@ -69,7 +68,7 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
   std::string text = "model     " + options.model.path.string() + ", " + std::to_string(model.mesh.triangles.size()) +
                      " triangles, " + number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) +
                      " mm\n";
-  text += "infill    " + std::string(name_of(options.infill)) + "\n";
+  text += "infill    " + std::string(name_of(options.recipe.infill())) + "\n";
   text += "voxel     " + number_text(*params.voxel_mm) + " mm\n";
   const Prediction expected = predict(model.mesh, *params.voxel_mm, params.recipe, params.infill);
   text += "solid     about " + number_text(expected.active_voxels / 1e6, 2) + " million voxels, a mesh of " +
@@ -126,11 +125,11 @@ void make_surface(Hybrid& hybrid, SurfaceLayers& layers, Report& report, const C
 void generate(const GenerateOptions& options) {
   HybridizeParams params;
   params.recipe = options.recipe.load();
-  params.infill = options.infill;
+  params.infill = options.recipe.infill();
   params.steps = options.steps.has_value();
   params.fix = options.fix;
   params.recipe.verify.up = direction(options.model.up);
-  check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
+  check_recipe(params.recipe, options.voxel_mm.value_or(0), options.recipe.infill());
 
   if (options.pictures.views.size() > options.pictures.files.size())
     throw UsageError("more views than pictures", "--view", "give each a --picture");
@@ -138,16 +137,16 @@ void generate(const GenerateOptions& options) {
   const Context& context = job.context();
   Outputs& outputs = job.outputs;
   Report& report = job.report;
-  report.infill = name_of(options.infill);
+  report.infill = name_of(options.recipe.infill());
   Stopwatch stage(report.stages);
 
   Model model = load_model(options.model, report, context.part(0, 0.05, "read"));
   params.recipe.verify.loads = with_paint(std::move(params.recipe.verify.loads), model.painted);
-  params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
-  check_recipe(params.recipe, *params.voxel_mm, options.infill);
+  params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.recipe.infill(), options.voxel_mm);
+  check_recipe(params.recipe, *params.voxel_mm, options.recipe.infill());
   const int axis = longest_axis(bounds(model.mesh));
   params.slabs = fit_into_memory(
-      model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
+      model.mesh, *params.voxel_mm, params.recipe, options.recipe.infill(), options.run,
       [&](double voxel_mm) { return SlabNeeds{.axis = axis, .margin_mm = 8 * voxel_mm, .surface = true}; }, 0,
       options.needs_whole(params.recipe));
   if (options.run.dry_run) return print(plan(options, model, params, job.report_path));
@@ -199,7 +198,7 @@ void add_generate_command(CLI::App& program) {
   endings.emplace_back(".vdb");
   add_options(command, options->model);
   add_options(command, options->output, endings);
-  add_infill(command, options->infill);
+  add_infill(command, options->recipe);
   add_voxel(command, options->voxel_mm,
             "Voxel edge (default: the smallest of longest side / 400, the recipe's thinnest feature / 3, and what "
             "necks of print.wall_mm are told at)");

@@ -105,6 +105,8 @@ std::string content_of(const fs::path& file) {
 
 }  // namespace
 
+InfillKind RecipeOptions::infill() const { return given_infill.value_or(usual_infill(preset)); }
+
 Recipe RecipeOptions::load() const {
   Recipe recipe = fibrolite::preset(preset);
   if (file) recipe = parse_recipe(content_of(*file), recipe, file->string());
@@ -209,15 +211,15 @@ std::string_view name_of(InfillKind kind) {
       ->name;
 }
 
-void add_infill(CLI::App& command, InfillKind& kind) {
+void add_infill(CLI::App& command, RecipeOptions& options) {
   std::vector<std::pair<std::string, InfillKind>> choices;
-  std::string help = "What fills the body:";
+  std::string help = "What fills the body (default: hybrid; with --preset peer-tcs, tcs):";
   for (const InfillName& infill : infill_names) {
     choices.emplace_back(infill.name, infill.kind);
     help += "\n  " + std::string(infill.name) + ": " + std::string(infill.help);
   }
   add_choice<InfillKind>(
-      command, "--infill", choices, [&](InfillKind chosen) { kind = chosen; }, help)
+      command, "--infill", choices, [&](InfillKind chosen) { options.given_infill = chosen; }, help)
       ->type_name("NAME");
 }
 

@@ -28,8 +28,11 @@ struct RecipeOptions {
   std::optional<std::filesystem::path> file;
   std::vector<std::string> assignments;
   std::optional<std::uint64_t> seed;
+  std::optional<InfillKind> given_infill;
   /// Preset, then the file, then each --set, then --seed. @throws Error BadRecipe.
   [[nodiscard]] Recipe load() const;
+  /// --infill, else the preset's usual one.
+  [[nodiscard]] InfillKind infill() const;
 };
 struct RunOptions {
   int threads = 0;                     ///< 0: as many as the machine has.
@@ -54,7 +57,7 @@ void add_options(CLI::App& command, OutputOptions& options, const std::vector<st
 void add_voxel(CLI::App& command, std::optional<double>& voxel_mm, const std::string& help);
 /// A length above 0, mm.
 void add_length(CLI::App& command, const std::string& name, std::optional<double>& length_mm, const std::string& help);
-void add_infill(CLI::App& command, InfillKind& kind);
+void add_infill(CLI::App& command, RecipeOptions& options);
 [[nodiscard]] std::string_view name_of(InfillKind kind);
 /// @throws UsageError: the file's ending is none of these (lower case, with the dot).
 void require_ending(const std::string& option, const std::filesystem::path& file,

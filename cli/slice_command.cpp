@@ -30,7 +30,6 @@ struct SliceOptions {
   OutputOptions output;
   std::optional<double> voxel_mm, layer_mm, pixel_mm;
   std::optional<Printer> printer;
-  InfillKind infill = InfillKind::Hybrid;
   bool tile = false, resume = false;
   int planes = 1;
 
@@ -177,7 +176,7 @@ WorkText work_of(const SliceOptions& options, const HybridizeParams& params, con
   work.add("--size", options.model.prepare.size_mm.value_or(0));
   const Vec3d up = direction(options.model.up);
   work.add("--up", number_text(up.x) + " " + number_text(up.y) + " " + number_text(up.z));
-  work.add("--infill", std::string(name_of(options.infill)));
+  work.add("--infill", std::string(name_of(options.recipe.infill())));
   work.add("--voxel", params.voxel_mm.value_or(0));
   work.add("--planes", std::to_string(options.planes));
   const Screen screen = options.printer ? options.printer->screen : Screen{};
@@ -207,7 +206,7 @@ void slice_to_files(const SliceOptions& options) {
   HybridizeParams params;
   params.recipe = options.recipe.load();
   params.recipe.verify.up = direction(options.model.up);
-  params.infill = options.infill;
+  params.infill = options.recipe.infill();
   params.function = true;
   Job job("slice", params.recipe, options.model, options.run, options.output);
   const Context& context = job.context();
@@ -233,13 +232,13 @@ void slice_to_files(const SliceOptions& options) {
     if (source.box.empty()) throw Error(Code::BadInput, "the solid is empty", options.model.path.string());
     report.model.size_mm = source.box.size();
   } else {
-    check_recipe(params.recipe, options.voxel_mm.value_or(0), options.infill);
+    check_recipe(params.recipe, options.voxel_mm.value_or(0), options.recipe.infill());
     model = load_model(options.model, report, context.part(0, 0.05, "read"));
     params.recipe.verify.loads = with_paint(std::move(params.recipe.verify.loads), model.painted);
-    params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.infill, options.voxel_mm);
-    check_recipe(params.recipe, *params.voxel_mm, options.infill);
+    params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.recipe.infill(), options.voxel_mm);
+    check_recipe(params.recipe, *params.voxel_mm, options.recipe.infill());
     source.box = bounds_in(frame, model.mesh);
-    const double thinnest = thinnest_mm(params.recipe, options.infill);
+    const double thinnest = thinnest_mm(params.recipe, options.recipe.infill());
     source.area_mm2 = 2 * area(model.mesh);
     if (std::isfinite(thinnest)) source.area_mm2 += 0.16 * std::abs(signed_volume(model.mesh)) / thinnest;
   }
@@ -249,12 +248,13 @@ void slice_to_files(const SliceOptions& options) {
   check_plates(options, plates, source.memory);
   if (!options.from_solid()) {
     params.slabs = fit_into_memory(
-        model.mesh, *params.voxel_mm, params.recipe, options.infill, options.run,
+        model.mesh, *params.voxel_mm, params.recipe, options.recipe.infill(), options.run,
         [&](double voxel_mm) { return needs_of_layers(options.model.up, options.layer_mm.value_or(0.05), voxel_mm); },
         slicing_memory(plates.front().grid), params.recipe.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "");
     source.slabs = params.slabs;
-    source.memory = params.slabs ? params.slabs->memory_bytes
-                                 : predict(model.mesh, *params.voxel_mm, params.recipe, options.infill).memory_bytes;
+    source.memory = params.slabs
+                        ? params.slabs->memory_bytes
+                        : predict(model.mesh, *params.voxel_mm, params.recipe, options.recipe.infill()).memory_bytes;
   }
   if (options.run.dry_run) return print(plan(options, source, plates));
 
@@ -265,7 +265,7 @@ void slice_to_files(const SliceOptions& options) {
   }
   std::optional<SolidStream> stream;
   if (!options.from_solid()) {
-    report.infill = name_of(options.infill);
+    report.infill = name_of(options.recipe.infill());
     params.function = !params.slabs;
     Hybrid hybrid = hybridize(model, params, report, context.part(0.05, 0.4, "fill"));
     model = {};
@@ -327,7 +327,7 @@ void add_slice_command(CLI::App& program) {
       .add_option("--planes", options->planes,
                   "Heights at which a layer is sampled: 1, 2, 4, 8 (default 1); more make flat slopes grey too")
       ->check(CLI::IsMember({1, 2, 4, 8}));
-  add_infill(command, options->infill);
+  add_infill(command, options->recipe);
   add_voxel(command, options->voxel_mm,
             "Voxel edge of the body, and of the check that all is one piece (default: as for generate)");
   add_options(command, options->recipe);

@@ -24,7 +24,6 @@ struct VerifyOptions {
   RunOptions run;
   OutputOptions output;
   bool solid = false;
-  InfillKind infill = InfillKind::Hybrid;
   std::optional<double> voxel_mm;
   int coarsen = 0;
 };
@@ -63,16 +62,16 @@ StressField judge_body(const Model& model, const Recipe& recipe, Report& report,
 /// The printed solid under the same load cases; a hybrid brings the stresses of the body along.
 StressField judge_solid(const VerifyOptions& options, const Model& model, const Recipe& recipe, Report& report,
                         const Context& context) {
-  const double voxel = choose_voxel(bounds(model.mesh), recipe, options.infill, options.voxel_mm);
-  check_memory(model.mesh, voxel, recipe, options.infill, options.run);
-  const HybridizeParams params{.recipe = recipe, .infill = options.infill, .voxel_mm = voxel, .steps = false};
+  const double voxel = choose_voxel(bounds(model.mesh), recipe, options.recipe.infill(), options.voxel_mm);
+  check_memory(model.mesh, voxel, recipe, options.recipe.infill(), options.run);
+  const HybridizeParams params{.recipe = recipe, .infill = options.recipe.infill(), .voxel_mm = voxel, .steps = false};
   Hybrid hybrid = hybridize(model, params, report, context.part(0, 0.5, "fill"));
-  report.infill = name_of(options.infill);
+  report.infill = name_of(options.recipe.infill());
   Stopwatch stage(report.stages);
   report.strength = stage("strength", [&] {
     return strength(hybrid, recipe, {.coarsen = options.coarsen}, context.part(0.5, 1, "strength"));
   });
-  if (const double thinnest = thinnest_mm(recipe, options.infill), cell = report.strength.front().cell_mm;
+  if (const double thinnest = thinnest_mm(recipe, options.recipe.infill()), cell = report.strength.front().cell_mm;
       thinnest < 5 * cell) {
     const double across = thinnest / cell;
     report.warnings.push_back("the thinnest members are " + number_text(across) + " cells thick: they bend about " +
@@ -92,7 +91,7 @@ void run_verify(const VerifyOptions& options, const CLI::App& command) {
   Recipe recipe = options.recipe.load();
   recipe.verify.up = direction(options.model.up);
   recipe.verify.keep_field = true;
-  if (options.solid) check_recipe(recipe, options.voxel_mm.value_or(0), options.infill);
+  if (options.solid) check_recipe(recipe, options.voxel_mm.value_or(0), options.recipe.infill());
   Job job("verify", recipe, options.model, options.run, options.output);
   const Context& context = job.context();
   Report& report = job.report;
@@ -130,7 +129,7 @@ void add_verify_command(CLI::App& program) {
   add_options(command, options->model);
   add_options(command, options->output, {".vtu", ".inp"});
   command.add_flag("--solid", options->solid, "Also the printed solid: what it carries and where it breaks first");
-  add_infill(command, options->infill);
+  add_infill(command, options->recipe);
   add_voxel(command, options->voxel_mm, "Voxel edge of the solid (default: as for generate)");
   command
       .add_option("--coarsen", options->coarsen,

@@ -27,7 +27,7 @@ Recipe paper() {
   return recipe;
 }
 
-/// The work that other lattice tools are measured by; used with the infill tcs.
+/// The work that other lattice tools are measured by.
 Recipe peer_tcs() {
   Recipe recipe;
   recipe.tcs.cell_mm = 5;
@@ -41,9 +41,10 @@ Recipe peer_tcs() {
 struct Preset {
   const char* name;
   Recipe (*make)();
+  InfillKind infill = InfillKind::Hybrid;
 };
 constexpr Preset presets[] = {
-    {"default", [] { return Recipe{}; }}, {"fdm", fdm}, {"paper", paper}, {"peer-tcs", peer_tcs}};
+    {"default", [] { return Recipe{}; }}, {"fdm", fdm}, {"paper", paper}, {"peer-tcs", peer_tcs, InfillKind::Tcs}};
 
 /// A length that has to survive sampling.
 struct Feature {
@@ -174,14 +175,21 @@ std::vector<std::string> preset_names() {
   return names;
 }
 
-Recipe preset(std::string_view name) {
+namespace {
+
+const Preset& find_preset(std::string_view name) {
   for (const Preset& p : presets)
-    if (name == p.name) return p.make();
+    if (name == p.name) return p;
   std::string all;
   for (const std::string& known : preset_names()) all += (all.empty() ? "" : ", ") + known;
   throw Error(Code::BadRecipe, "unknown preset '" + std::string(name) + "'", "presets: " + all,
               "did you mean " + nearest_name(name, preset_names()) + "?");
 }
+
+}  // namespace
+
+Recipe preset(std::string_view name) { return find_preset(name).make(); }
+InfillKind usual_infill(std::string_view preset_name) { return find_preset(preset_name).infill; }
 
 CoreParams core_params(const Recipe& recipe) {
   return {recipe.partition.concentration, recipe.partition.core_share, recipe.partition.min_slenderness,

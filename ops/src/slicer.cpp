@@ -245,7 +245,9 @@ double positive(double value, double none, const char* key) {
 
 SlicerParams params_of(const fibrolite_options& options) {
   SlicerParams params;
-  params.fill.recipe = preset(options.preset != nullptr ? std::string_view(options.preset) : preset_names().front());
+  const std::string start = options.preset != nullptr ? options.preset : preset_names().front();
+  params.fill.recipe = preset(start);
+  params.fill.infill = usual_infill(start);
   if (options.recipe != nullptr) params.fill.recipe = parse_recipe(options.recipe, params.fill.recipe, "recipe");
   if (options.infill != nullptr) params.fill.infill = infill_of(options.infill);
   const auto wanted = [](double value, const char* key) {

@@ -184,6 +184,18 @@ TEST(Generate, LessMemoryTiesAndRemovesTheSameStickEnds) {
     EXPECT_EQ(a[block], b[block]) << block;
 }
 
+TEST(Generate, APresetBringsItsInfillUnlessOneIsNamed) {
+  const TempDir folder;
+  const auto plan = [&](std::vector<std::string> more) {
+    std::vector<std::string> command{"generate", asset("molar"), "--voxel", "0.4", "-o", folder / "a.stl", "--dry-run"};
+    command.insert(command.end(), more.begin(), more.end());
+    return run(command).out;
+  };
+  EXPECT_THAT(plan({}), HasSubstr("infill    hybrid"));
+  EXPECT_THAT(plan({"--preset", "peer-tcs"}), HasSubstr("infill    tcs"));
+  EXPECT_THAT(plan({"--infill", "mfs", "--preset", "peer-tcs"}), HasSubstr("infill    mfs"));
+}
+
 TEST(Generate, ADryRunSaysWhatTheRunWillTake) {
   const auto said = [](const std::string& voxel, const std::string& unit) {
     const TempDir folder;

@@ -54,6 +54,12 @@ TEST(Presets, HoldTheNumbersTheyPromise) {
   EXPECT_FALSE(preset("default").partition.threshold.has_value());
 }
 
+TEST(Presets, FillTheBodyAsTheirWorkDoes) {
+  for (const std::string& name : preset_names())
+    EXPECT_EQ(usual_infill(name), name == "peer-tcs" ? InfillKind::Tcs : InfillKind::Hybrid) << name;
+  EXPECT_THROW(static_cast<void>(usual_infill("pear-tcs")), Error);
+}
+
 TEST(Presets, EachFitsItsOwnRules) {
   for (const std::string& name : preset_names())
     EXPECT_EQ(refusal([&] { check_recipe(preset(name), thinnest_mm(preset(name)) / 2); }), "") << name;

@@ -51,7 +51,7 @@ typedef struct fibrolite_mesh {
 typedef struct fibrolite_options {
   const char* recipe;      /**< JSON, what `fibrolite recipe` prints or a part of it; laid over the preset. */
   const char* preset;      /**< "default". */
-  const char* infill;      /**< "hybrid"; or tcs, mfs, gyroid, shell, solid. */
+  const char* infill;      /**< The preset's, "hybrid" nearly always; or tcs, mfs, gyroid, shell, solid. */
   fibrolite_up up;         /**< Layers lie across it; it is also where loads come from. */
   double unit_mm;          /**< Millimetres per unit of the model; default: what the file says, else 1. */
   double size_mm;          /**< Scale the longest side to this; default: leave it. */

@@ -52,6 +52,9 @@ struct Recipe {
 [[nodiscard]] std::vector<std::string> preset_names();
 /// @throws Error BadRecipe: unknown preset (with the nearest name).
 [[nodiscard]] Recipe preset(std::string_view name);
+/// What fills the body where a preset is named and no infill is: hybrid, but tcs with peer-tcs, whose work has no
+/// parts.
+[[nodiscard]] InfillKind usual_infill(std::string_view preset_name);
 
 /// Strict: an unknown or repeated key, a wrong type or a value out of range is an error that names the place and the
 /// nearest key. Keys left out keep the value of `base`. `source_name` is where the text comes from, for messages.
