@@ -32,7 +32,7 @@ struct DiameterParams {
 };
 struct DiameterField {
   std::vector<double> diameter_mm;  ///< One per face of the surface, smoothed.
-  std::vector<double> normalized;   ///< nsdf in [0, 1], paper Sec. 4.1.
+  std::vector<double> normalized;   ///< nsdf in [0, 1], Sec. 4.1; 0.1 % at either end are 0 or 1.
 };
 /// @throws Error BadInput: empty or open surface. Cost: about 0.1 ms per face. Source: Shapira et al. 2008; CGAL's
 /// sdf_values.
