@@ -254,16 +254,23 @@ double step_for_volume(double wanted_mm3, double six_volumes, const Mover& mover
         p[k] = to_vec(q[k] >= mine.first ? places[s][q[k] - mine.first] : before[s][q[k] - below]);
       return p;
     };
-    for (const std::size_t s : {0U, 2U, 3U}) {
-      volume[s] += tbb::parallel_deterministic_reduce(
-          Range(0, mine.quads.size(), 4096), 0.0,
-          [&](const Range& some, double sum) {
-            for (std::size_t i = some.begin(); i < some.end(); ++i)
-              sum += six_volumes_of(corners(mine.quads[i], s), diagonal(corners(mine.quads[i], 1)));
-            return sum;
-          },
-          std::plus<>{});
-    }
+    using Sums = std::array<double, steps.size()>;
+    const auto plus = [](Sums some, const Sums& more) {
+      for (std::size_t s = 0; s < some.size(); ++s) some[s] += more[s];
+      return some;
+    };
+    volume = plus(volume, tbb::parallel_deterministic_reduce(
+                              Range(0, mine.quads.size(), 4096), Sums{},
+                              [&](const Range& some, Sums sums) {
+                                for (std::size_t i = some.begin(); i < some.end(); ++i) {
+                                  const Quad& q = mine.quads[i];
+                                  const std::size_t along = diagonal(corners(q, 1));
+                                  for (const std::size_t s : {0U, 2U, 3U})
+                                    sums[s] += six_volumes_of(corners(q, s), along);
+                                }
+                                return sums;
+                              },
+                              plus));
     std::swap(places, before);
   }
   const auto missing = [&](double s) {  // on the cubic through all four

@@ -76,8 +76,8 @@ BandParams band_params(const Mesh& mesh, const ToSolidParams& params) {
 
 /// A mesh and what is asked of it.
 struct Surface {
-  explicit Surface(std::shared_ptr<const Mesh> m)
-      : mesh(std::move(m)), topology(surface_topology(*mesh)), winding(*mesh) {}
+  explicit Surface(std::shared_ptr<const Mesh> m, const std::optional<WindingTree>& tree = {})
+      : mesh(std::move(m)), topology(surface_topology(*mesh)), winding(tree ? *tree : WindingTree(*mesh)) {}
   std::shared_ptr<const Mesh> mesh;
   SurfaceTopology topology;
   WindingTree winding;
@@ -102,7 +102,7 @@ std::unique_ptr<Surface> outermost(const Surface& from, const BandParams& wanted
 class Conversion {
  public:
   Conversion(std::shared_ptr<const Mesh> mesh, const ToSolidParams& params, const Context& context)
-      : params_(band_params(*mesh, params)), surface_(std::make_unique<Surface>(std::move(mesh))) {
+      : params_(band_params(*mesh, params)), surface_(std::make_unique<Surface>(std::move(mesh), params.tree)) {
     if (!surface_->topology.closed()) {
       repairs_.emplace_back("open or irregular surface (" + std::to_string(surface_->topology.border.size()) +
                             " border edges): inside and outside were told by winding number");

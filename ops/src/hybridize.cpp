@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "fibrolite/blocks.h"
@@ -57,10 +58,12 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
 
   // Interiors and joints (paper Sec. 5 and 6), as distance functions.
   const bool sections = params.infill == InfillKind::Hybrid || params.infill == InfillKind::Mfs;
+  std::optional<WindingTree> model_tree;
   Shape model_distance;
   std::vector<Fill> fills;
   run("infill", 0.40, [&](const Context& c) {
-    if (sections || recipe.tcs.grade != TcsGrade::None) model_distance = distance_to(WindingTree(model.mesh));
+    if (sections || recipe.tcs.grade != TcsGrade::None)
+      model_distance = distance_to(model_tree.emplace(WindingTree(model.mesh)));
     const auto thickness = grading(bounds(model.mesh), model_distance, recipe, stress_mpa, c);
     if (thickness)
       recipe.tcs =
@@ -90,7 +93,9 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     return out;
   }
   const Solid body = run("body", 0.60, [&](const Context& c) {
-    ToSolidResult made = to_solid(model.mesh, {.grid = grid, .inside_band_mm = depth_for_shell(shell_mm, voxel)}, c);
+    const ToSolidParams wanted{
+        .grid = grid, .inside_band_mm = depth_for_shell(shell_mm, voxel), .tree = std::move(model_tree)};
+    ToSolidResult made = to_solid(model.mesh, wanted, c);
     report.model.repairs.insert(report.model.repairs.end(), made.repairs.begin(), made.repairs.end());
     return made.solid;
   });

@@ -52,6 +52,7 @@ Proxy make_proxy(const Mesh& world, const ProxyParams& params, const Context& co
   // A surface crosses 1.5 lattice edges per square voxel on average; each gives two triangles.
   double voxel = std::max(std::sqrt(3 * model_area / params.triangles), least_voxel);
   const double finest = std::max(voxel / std::sqrt(finest_share), least_voxel);
+  const WindingTree tree(model);
   for (int round = 0;; ++round) {
     context.check();
     Proxy proxy;
@@ -59,7 +60,8 @@ Proxy make_proxy(const Mesh& world, const ProxyParams& params, const Context& co
     bool last = voxel <= finest * 1.001;
     try {
       proxy.solid =
-          to_solid(model, {.grid = {.voxel_mm = voxel, .band_vox = 3}}, context.part(0.0, 0.8, "proxy")).solid;
+          to_solid(model, {.grid = {.voxel_mm = voxel, .band_vox = 3}, .tree = tree}, context.part(0.0, 0.8, "proxy"))
+              .solid;
     } catch (const Error& error) {
       if (error.code() != Code::BadInput || last) throw;
       proxy.solid = {};

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "fibrolite/context.h"
 #include "fibrolite/mesh.h"
 #include "fibrolite/solid.h"
+#include "fibrolite/winding.h"
 
 namespace fibrolite {
 
@@ -17,6 +19,8 @@ struct ToSolidParams {
   /// The band reaches at least this deep inside the surface, mm (the shell needs its thickness), and grid.band_vox
   /// outside.
   double inside_band_mm = 0;
+  /// Of this mesh, where there is one already; else one is made.
+  std::optional<WindingTree> tree{};
 };
 struct ToSolidResult {
   /// Interior background is -(inside_band_mm + band), or less if the body is nowhere so deep; exterior +band.
