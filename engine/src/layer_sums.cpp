@@ -9,15 +9,12 @@
 #include <cstddef>
 #include <cstring>
 
+#include "eight_places.h"
 #include "fibrolite/clones.h"
 
 namespace fibrolite {
 namespace {
 
-constexpr std::size_t lanes = 8;
-using Lanes [[gnu::vector_size(32)]] = float;
-using Mask [[gnu::vector_size(32)]] = std::int32_t;  // a lane is all ones or zero
-using Doubles [[gnu::vector_size(64)]] = double;
 using Range = tbb::blocked_range<std::size_t>;
 
 struct Eight {
@@ -27,18 +24,15 @@ struct Eight {
 
 FIBROLITE_CLONES void add_eight(const Mesh::Triangle* triangles, const Vec3f* vertices, std::size_t first, Vec3d from,
                                 Eight& sums) {
-  std::array<std::array<Lanes, 3>, 3> p;  // corner, axis
-  std::array<std::array<float, lanes>, 3> flat;
-  for (std::size_t corner = 0; corner < 3; ++corner) {
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const Vec3f& v = vertices[triangles[lane][corner] - first];
-      flat[0][lane] = v.x;
-      flat[1][lane] = v.y;
-      flat[2][lane] = v.z;
-    }
-    std::memcpy(&p[corner], &flat, sizeof flat);
+  std::array<EightPlaces, 3> p;
+  for (std::size_t corner = 0; corner < 3; ++corner) gather(triangles, corner, vertices, first, p[corner]);
+  EightPlaces u, v, n;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    u[axis] = p[1][axis] - p[0][axis];
+    v[axis] = p[2][axis] - p[0][axis];
   }
-  Mask clear{};
+  Mask clear;
+  cross(u, v, n, clear);
   std::array<std::array<Doubles, 3>, 3> d;
   const std::array<double, 3> zero{from.x, from.y, from.z};
   for (std::size_t corner = 0; corner < 3; ++corner)
@@ -49,9 +43,6 @@ FIBROLITE_CLONES void add_eight(const Mesh::Triangle* triangles, const Vec3f* ve
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::size_t y = (axis + 1) % 3, z = (axis + 2) % 3;
     volume += d[0][axis] * (d[1][y] * d[2][z] - d[1][z] * d[2][y]);
-    const Lanes n1 = (p[1][y] - p[0][y]) * (p[2][z] - p[0][z]), n2 = (p[1][z] - p[0][z]) * (p[2][y] - p[0][y]);
-    const Lanes n = n1 - n2, greatest = n1 * n1 > n2 * n2 ? n1 * n1 : n2 * n2;
-    clear |= n * n > 4e-12F * greatest + 1e-36F;
   }
   std::memcpy(&sums.six_volumes, &volume, sizeof volume);
   std::memcpy(&sums.clear, &clear, sizeof clear);

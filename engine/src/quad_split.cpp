@@ -10,19 +10,14 @@
 #include <cstring>
 #include <functional>
 
+#include "eight_places.h"
 #include "fibrolite/clones.h"
 #include "quad_envelope.h"
 
 namespace fibrolite {
 namespace {
 
-constexpr std::size_t lanes = 8;
-using Lanes [[gnu::vector_size(32)]] = float;
-using Mask [[gnu::vector_size(32)]] = std::int32_t;  // a lane is all ones or zero
-using Doubles [[gnu::vector_size(64)]] = double;
-
-/// Corners of eight quads, one coordinate of all beside each other.
-using Corners = std::array<std::array<Lanes, 3>, 4>;
+using Corners = std::array<EightPlaces, 4>;
 struct Choice {
   std::array<std::int32_t, lanes> second;  ///< Is the second diagonal the shorter one?
   std::array<std::int32_t, lanes> doubt;   ///< Must this one be looked at more closely?
@@ -40,26 +35,21 @@ struct Choice {
   }
   const Mask second = __builtin_convertvector(first_length > second_length, Mask);
 
-  std::array<Lanes, 3> u, across, v;  // from where the diagonal begins
+  EightPlaces u, across, v, n, m;  // from where the diagonal begins
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Lanes begin = second ? at[1][axis] : at[0][axis];
     u[axis] = (second ? at[2][axis] : at[1][axis]) - begin;
     across[axis] = (second ? at[3][axis] : at[2][axis]) - begin;
     v[axis] = (second ? at[0][axis] : at[3][axis]) - begin;
   }
+  Mask clear_n, clear_m;
+  cross(u, across, n, clear_n);
+  cross(across, v, m, clear_m);
   Lanes cosine{}, squared_n{}, squared_m{};
-  Mask clear_n{}, clear_m{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::size_t y = (axis + 1) % 3, z = (axis + 2) % 3;
-    const Lanes n1 = u[y] * across[z], n2 = u[z] * across[y], m1 = across[y] * v[z], m2 = across[z] * v[y];
-    const Lanes n = n1 - n2, m = m1 - m2;
-    // Twice the greater one: no less than their sum.
-    const Lanes n12 = n1 * n1 > n2 * n2 ? n1 * n1 : n2 * n2, m12 = m1 * m1 > m2 * m2 ? m1 * m1 : m2 * m2;
-    clear_n |= n * n > 4e-12F * n12 + 1e-36F;
-    clear_m |= m * m > 4e-12F * m12 + 1e-36F;
-    cosine += n * m;
-    squared_n += n * n;
-    squared_m += m * m;
+    cosine += n[axis] * m[axis];
+    squared_n += n[axis] * n[axis];
+    squared_m += m[axis] * m[axis];
   }
   const Mask hardly_folds = (cosine > 0) & (cosine * cosine > 0.82F * squared_n * squared_m);
   const Mask doubt = ~(clear_n & clear_m & hardly_folds);
@@ -67,23 +57,13 @@ struct Choice {
   std::memcpy(choice.doubt.data(), &doubt, sizeof doubt);
 }
 
-[[gnu::always_inline]] inline void gather(const Quad* quads, std::size_t first, const Vec3f* places, Corners& at) {
-  for (std::size_t corner = 0; corner < 4; ++corner) {
-    std::array<std::array<float, lanes>, 3> flat;
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const Vec3f& p = places[quads[lane][corner] - first];
-      flat[0][lane] = p.x;
-      flat[1][lane] = p.y;
-      flat[2][lane] = p.z;
-    }
-    std::memcpy(&at[corner], &flat, sizeof flat);
-  }
-}
 FIBROLITE_CLONES void choose(const Quad* quads, const QuadSplit::Vertices& vertices, Choice& choice) {
   Corners at, shape;
-  gather(quads, vertices.first, vertices.places.data(), at);
   const bool same = vertices.shape.data() == vertices.places.data();
-  if (!same) gather(quads, vertices.first, vertices.shape.data(), shape);
+  for (std::size_t k = 0; k < 4; ++k) {
+    gather(quads, k, vertices.places.data(), vertices.first, at[k]);
+    if (!same) gather(quads, k, vertices.shape.data(), vertices.first, shape[k]);
+  }
   choose(at, same ? at : shape, choice);
 }
 
