@@ -72,6 +72,19 @@ void check_of_solid(const CLI::App& command, const fs::path& solid) {
   }
 }
 
+/// A layer higher than the part, or a pixel wider: another unit was meant.
+void check_steps(const SliceGrid& grid, const Vec3d& size) {
+  const auto refuse = [](const char* option, double step_mm, const char* what, double part_mm) {
+    throw UsageError("a " + std::string(what) + " of " + number_text(step_mm) + " mm is more than the part, " +
+                         number_text(part_mm) + " mm",
+                     option, std::string("lengths are mm; use a smaller ") + option);
+  };
+  const double widest = std::max(size.x, size.y);
+  if (grid.layer_mm > size.z) refuse("--layer", grid.layer_mm, "layer", size.z);
+  if (grid.pixel_mm.x > widest || grid.pixel_mm.y > widest)
+    refuse("--pixel", std::max(grid.pixel_mm.x, grid.pixel_mm.y), "pixel", widest);
+}
+
 /// Layers and pixels that a format cannot hold are refused before anything is made.
 void check_plates(const SliceOptions& options, const std::vector<SlicePlate>& plates, double memory) {
   double layers = 0;
@@ -245,6 +258,7 @@ void slice_to_files(const SliceOptions& options) {
   const std::vector<SlicePlate> plates =
       make_plates(frame, source.box,
                   {options.layer_mm.value_or(0.05), options.pixel_mm.value_or(0.05), options.printer, options.tile});
+  check_steps(plates.front().grid, source.box.size());
   check_plates(options, plates, source.memory);
   if (!options.from_solid()) {
     params.slabs = fit_into_memory(

@@ -194,6 +194,10 @@ TEST_F(SlicingRefused, LengthsThatAreNone) {
     EXPECT_THAT(refused({"--pixel", bad}, Usage), HasSubstr("--pixel"));
   }
 }
+TEST_F(SlicingRefused, StepsLargerThanThePart) {
+  EXPECT_THAT(refused({"--layer", "21"}, Usage), HasSubstr("a layer of 21 mm is more than the part, 20 mm"));
+  EXPECT_THAT(refused({"--pixel", "21"}, Usage), HasSubstr("a pixel of 21 mm is more than the part, 20 mm"));
+}
 TEST_F(SlicingRefused, PrintersThatAreNone) {
   for (const char* bad : {"sl9", "", "10x10:5x5", "10x10x10:5x5x5", "10x10x10:5.5x5", "0x10x10:5x5", "10x10xnan:5x5",
                           "10x10x10:0x5", "10x10x10:100000x100000"})
