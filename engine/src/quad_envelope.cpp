@@ -17,17 +17,29 @@ bool folds(const std::array<Vec3d, 4>& corners, bool first) {
   return cosine < 0 || cosine * cosine < most * most * dot(n, n) * dot(m, m);
 }
 
-/// @param corners  In voxels.
-bool in_envelope(const std::array<Vec3d, 4>& corners, bool first) {
-  std::array<Vec3d, 4> cell;
+using Quadruple = std::array<Vec3d, 4>;
+
+Quadruple cells_of(const Quadruple& corners) {
+  Quadruple cell;
   for (std::size_t k = 0; k < 4; ++k)
     cell[k] = {std::floor(corners[k].x), std::floor(corners[k].y), std::floor(corners[k].z)};
-  // Along the edge all cells are alike.
+  return cell;
+}
+
+/// Of the edge: along it all cells are alike. 3 if there is none.
+int axis_of(const Quadruple& cell) {
   int along = 0;
   const auto alike = [&](int axis) {
     return cell[0][axis] == cell[1][axis] && cell[0][axis] == cell[2][axis] && cell[0][axis] == cell[3][axis];
   };
   while (along < 3 && !alike(along)) ++along;
+  return along;
+}
+
+/// @param corners  In voxels.
+bool in_envelope(const Quadruple& corners, bool first) {
+  const Quadruple cell = cells_of(corners);
+  const int along = axis_of(cell);
   if (along == 3) return false;
   const int u = (along + 1) % 3, w = (along + 2) % 3;
   const auto on_edge = [&](int axis) { return std::max({cell[0][axis], cell[1][axis], cell[2][axis], cell[3][axis]}); };
@@ -57,13 +69,26 @@ bool in_envelope(const std::array<Vec3d, 4>& corners, bool first) {
   return false;
 }
 
+Quadruple in_voxels(const Quadruple& corners, double voxel_mm) {
+  Quadruple voxels;
+  for (std::size_t k = 0; k < 4; ++k) voxels[k] = 1 / voxel_mm * corners[k];
+  return voxels;
+}
+
 }  // namespace
 
 bool wrong_diagonal(const std::array<Vec3d, 4>& corners, double voxel_mm, bool first) {
   if (!folds(corners, first)) return false;
-  std::array<Vec3d, 4> voxels;
-  for (std::size_t k = 0; k < 4; ++k) voxels[k] = 1 / voxel_mm * corners[k];
+  const Quadruple voxels = in_voxels(corners, voxel_mm);
   return !in_envelope(voxels, first) && in_envelope(voxels, !first);
+}
+
+std::optional<int> no_diagonal(const std::array<Vec3d, 4>& corners, double voxel_mm, bool first) {
+  if (!folds(corners, first)) return std::nullopt;
+  const Quadruple voxels = in_voxels(corners, voxel_mm);
+  const int along = axis_of(cells_of(voxels));
+  if (along == 3 || in_envelope(voxels, true) || in_envelope(voxels, false)) return std::nullopt;
+  return along;
 }
 
 }  // namespace fibrolite

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "fibrolite/vec.h"
 
@@ -17,5 +18,7 @@ namespace fibrolite {
 /// @returns false too where the corners do not tell of which edge they are.
 /// Cost: O(1). Source: Ju and Udeshi 2006 (intersection-free contouring).
 [[nodiscard]] bool wrong_diagonal(const std::array<Vec3d, 4>& corners, double voxel_mm, bool first);
+/// The axis of the quad's edge, if neither diagonal is right; not looked into if it hardly folds along this one.
+[[nodiscard]] std::optional<int> no_diagonal(const std::array<Vec3d, 4>& corners, double voxel_mm, bool first);
 
 }  // namespace fibrolite

@@ -8,7 +8,6 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <functional>
 
 #include "eight_places.h"
 #include "fibrolite/clones.h"
@@ -78,18 +77,21 @@ bool sound(const Quad& q, bool first, const QuadSplit::Vertices& vertices) {
 
 }  // namespace
 
-bool QuadSplit::degenerate(const Quad& quad, const Vertices& vertices) {
-  return !sound(quad, true, vertices) && !sound(quad, false, vertices);
-}
-
-bool QuadSplit::operator()(std::span<const Quad> quads, const Vertices& vertices,
-                           std::span<Mesh::Triangle> triangles) const {
-  const auto wrong = [&](const Quad& q, bool first) {
+QuadSplit::Left QuadSplit::operator()(std::span<const Quad> quads, const Vertices& vertices,
+                                      std::span<Mesh::Triangle> triangles) const {
+  // In doubt: the shorter diagonal, unless only the other one is good.
+  const auto first_of = [&](std::size_t number, bool shorter_is_first, Left& left) {
+    const Quad& q = quads[number];
+    const bool good = sound(q, shorter_is_first, vertices), other = sound(q, !shorter_is_first, vertices);
+    if (!good && !other) left.degenerate.push_back(number);
+    if (!good) return !shorter_is_first;
+    if (stand_in_) return shorter_is_first;
     std::array<Vec3d, 4> corners;
     for (std::size_t k = 0; k < 4; ++k) corners[k] = to_double(vertices.at(q[k]));
-    return wrong_diagonal(corners, voxel_mm_, first);
+    if (no_diagonal(corners, voxel_mm_, shorter_is_first)) left.astray.push_back(number);
+    return wrong_diagonal(corners, voxel_mm_, shorter_is_first) && other ? !shorter_is_first : shorter_is_first;
   };
-  const auto some = [&](const tbb::blocked_range<std::size_t>& range, bool all_sound) {
+  const auto some = [&](const tbb::blocked_range<std::size_t>& range, Left left) {
     Choice choice;
     for (std::size_t from = range.begin(); from < range.end(); from += lanes) {
       const std::size_t count = std::min(lanes, range.end() - from);
@@ -104,21 +106,19 @@ bool QuadSplit::operator()(std::span<const Quad> quads, const Vertices& vertices
       for (std::size_t lane = 0; lane < count; ++lane) {
         const Quad& q = eight[lane];
         bool first = choice.second[lane] == 0;
-        if (choice.doubt[lane] != 0) {
-          const bool good = sound(q, first, vertices);
-          if (!good || (!stand_in_ && wrong(q, first))) {
-            const bool other = sound(q, !first, vertices);
-            all_sound = all_sound && (good || other);
-            if (!good || other) first = !first;
-          }
-        }
+        if (choice.doubt[lane] != 0) first = first_of(from + lane, first, left);
         triangles[2 * (from + lane)] = {q[0], q[1], first ? q[2] : q[3]};
         triangles[2 * (from + lane) + 1] = {first ? q[0] : q[1], q[2], q[3]};
       }
     }
-    return all_sound;
+    return left;
   };
-  return tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, quads.size(), 4096), true, some, std::logical_and<>{});
+  return tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, quads.size(), 4096), Left{}, some,
+                              [](Left a, const Left& b) {
+                                a.degenerate.insert(a.degenerate.end(), b.degenerate.begin(), b.degenerate.end());
+                                a.astray.insert(a.astray.end(), b.astray.begin(), b.astray.end());
+                                return a;
+                              });
 }
 
 }  // namespace fibrolite

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "dual_surface.h"
 #include "fibrolite/mesh.h"
@@ -22,12 +23,15 @@ class QuadSplit {
     std::size_t first = 0;         ///< Number of the first one.
     [[nodiscard]] Vec3f at(std::uint32_t v) const { return places[v - first]; }
   };
+  /// Quads whose vertices should be moved, for they have no good diagonal; in order.
+  struct Left {
+    std::vector<std::size_t> degenerate;  ///< Either leaves a triangle without area.
+    std::vector<std::size_t> astray;      ///< Either leads into another quad.
+    [[nodiscard]] bool empty() const { return degenerate.empty() && astray.empty(); }
+  };
   /// @param triangles  Two for each quad: its first and second corner first, its third and fourth last.
-  /// @returns whether each has a diagonal that leaves no triangle without area.
   /// Cost: O(n), parallel; eight quads at a time.
-  bool operator()(std::span<const Quad> quads, const Vertices& vertices, std::span<Mesh::Triangle> triangles) const;
-  /// Has this one none?
-  [[nodiscard]] static bool degenerate(const Quad& quad, const Vertices& vertices);
+  Left operator()(std::span<const Quad> quads, const Vertices& vertices, std::span<Mesh::Triangle> triangles) const;
 
  private:
   double voxel_mm_;

@@ -17,6 +17,7 @@
 #include "fibrolite/file.h"
 #include "fibrolite/random.h"
 #include "keep_volume.h"
+#include "quad_envelope.h"
 #include "quad_split.h"
 
 #ifdef __GLIBC__
@@ -129,11 +130,8 @@ class Finisher {
       each_chunk(layer.points.size(), [&](std::size_t i) { whole_[from + i] = moved(i, 1); });
     }
     next_.resize(2 * layer.quads.size());
-    if (!split_(layer.quads, vertices(), next_)) {
-      shake_degenerate(layer.quads);
-      split_(quads_of(waits_.triangles), vertices(), waits_.triangles);
-      split_(layer.quads, vertices(), next_);
-    }
+    const QuadSplit::Left left = split_(layer.quads, vertices(), next_);
+    if (!left.empty()) mend(layer.quads, left);
     hand_on();
     before_ = upper_;
     upper_ = layer.points.size();
@@ -154,21 +152,72 @@ class Finisher {
     return quads;
   }
 
-  /// Quads that neither diagonal saves: move a corner by a thousandth of a voxel in a random direction and look again.
-  void shake_degenerate(const Quads& quads) {
+  /// A layer's quads, what they have become, and what is wrong with them.
+  struct Split {
+    std::span<const Quad> quads;
+    std::vector<Mesh::Triangle>& triangles;
+    QuadSplit::Left left{};
+  };
+  /// Quads that neither diagonal saves: their corners are moved, and all that touch them split again. What has been
+  /// handed on already stays.
+  void mend(const Quads& quads, QuadSplit::Left left) {
     Random random(1, "surface", number_);
-    bool any = true;
-    for (int round = 0; round < 8 && any; ++round) {
-      any = false;
-      for (const auto& q : quads) {
-        if (!QuadSplit::degenerate(q, vertices())) continue;
-        any = true;
-        for (const std::uint32_t v : q) {
-          const auto step = [&] { return static_cast<float>((random.uniform() - 0.5) * 4e-3 * voxel_mm_); };
-          Vec3f& p = points_[v - first_];
-          p = {p.x + step(), p.y + step(), p.z + step()};
-        }
+    const Quads waiting = quads_of(waits_.triangles);
+    std::array<Split, 2> layers{Split{waiting, waits_.triangles}, {quads, next_, std::move(left)}};
+    for (int round = 0; round < 8 && !(layers[0].left.empty() && layers[1].left.empty()); ++round) {
+      moved_.assign(points_.size(), 0);
+      for (const Split& layer : layers) {
+        for (const std::size_t i : layer.left.degenerate) shake(layer.quads[i], random);
+        for (const std::size_t i : layer.left.astray) flatten(layer.quads[i]);
       }
+      for (Split& layer : layers) split_again(layer);
+    }
+  }
+  void split_again(Split& layer) {
+    std::vector<std::size_t> touched;
+    for (std::size_t i = 0; i < layer.quads.size(); ++i) {
+      const auto& [a, b, c, d] = layer.quads[i];
+      if ((moved_[a - first_] | moved_[b - first_] | moved_[c - first_] | moved_[d - first_]) != 0)
+        touched.push_back(i);
+    }
+    Quads some;
+    for (const std::size_t i : touched) some.push_back(layer.quads[i]);
+    std::vector<Mesh::Triangle> triangles(2 * some.size());
+    layer.left = split_(some, vertices(), triangles);
+    for (std::size_t n = 0; n < touched.size(); ++n)
+      for (const std::size_t k : {0U, 1U}) layer.triangles[2 * touched[n] + k] = triangles[2 * n + k];
+    for (std::vector<std::size_t>* list : {&layer.left.degenerate, &layer.left.astray})
+      for (std::size_t& i : *list) i = touched[i];
+  }
+  void move(std::uint32_t v, Vec3f to) {
+    points_[v - first_] = to;
+    moved_[v - first_] = 1;
+  }
+  /// By a thousandth of a voxel in a random direction.
+  void shake(const Quad& quad, Random& random) {
+    for (const std::uint32_t v : quad) {
+      const auto step = [&] { return static_cast<float>((random.uniform() - 0.5) * 4e-3 * voxel_mm_); };
+      const Vec3f p = points_[v - first_];
+      move(v, {p.x + step(), p.y + step(), p.z + step()});
+    }
+  }
+  /// Halves how far its corners lie apart along its edge: they stay in their cells, and a flat quad has a good
+  /// diagonal.
+  void flatten(const Quad& quad) {
+    std::array<Vec3d, 4> corners;
+    Vec3d middle{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      corners[k] = to_double(points_[quad[k] - first_]);
+      middle = middle + 0.25 * corners[k];
+    }
+    const std::optional<int> along = no_diagonal(corners, voxel_mm_, true);
+    const std::optional<int> axis = along ? along : no_diagonal(corners, voxel_mm_, false);
+    if (!axis) return;  // a neighbour has mended it
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (quad[k] - first_ < before_) continue;
+      Vec3f p = points_[quad[k] - first_];
+      (*axis == 0 ? p.x : *axis == 1 ? p.y : p.z) = static_cast<float>(0.5 * (corners[k][*axis] + middle[*axis]));
+      move(quad[k], p);
     }
   }
 
@@ -195,6 +244,7 @@ class Finisher {
   std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
   FinishedLayer waits_;
   std::vector<Mesh::Triangle> next_;  // of the next
+  std::vector<std::uint8_t> moved_;   // is a point, while quads are mended?
 };
 
 }  // namespace

@@ -210,6 +210,18 @@ TEST(Surface, does_not_cut_itself) {
   }
 }
 
+/// Where thin sticks meet a wall, a quad may have no diagonal that keeps to its envelope: its corners are moved then.
+TEST(Surface, does_not_cut_itself_where_neither_diagonal_will_do) {
+  Random random(48, "sticks");
+  std::vector<Shape> parts{complement(cuboid({{-5, -5, -5}, {5, 5, 5}}))};
+  const auto anywhere = [&] { return Vec3d{random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5}; };
+  for (int i = 0; i < 60; ++i) parts.push_back(capsule(24 * anywhere(), 24 * anywhere(), 0.2 + 0.4 * random.uniform()));
+  const Shape sticks = intersect({unite(parts), cuboid({{-6, -6, -6}, {6, 6, 6}})});
+  const Mesh mesh = surface(realize(sticks, box, {.voxel_mm = 0.1 + 0.15 * random.uniform()}));
+  ASSERT_GT(mesh.triangles.size(), 100000U);
+  EXPECT_EQ(inspect(mesh).self_intersections, 0);
+}
+
 /// Is a point in the tetrahedron, or on it?
 bool in_tetrahedron(Vec3d p, Vec3d a, Vec3d b, Vec3d c, Vec3d d) {
   const auto volume = [](Vec3d i, Vec3d j, Vec3d k, Vec3d l) { return dot(j - i, cross(k - i, l - i)); };
