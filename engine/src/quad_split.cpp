@@ -82,14 +82,16 @@ QuadSplit::Left QuadSplit::operator()(std::span<const Quad> quads, const Vertice
   // In doubt: the shorter diagonal, unless only the other one is good.
   const auto first_of = [&](std::size_t number, bool shorter_is_first, Left& left) {
     const Quad& q = quads[number];
-    const bool good = sound(q, shorter_is_first, vertices), other = sound(q, !shorter_is_first, vertices);
-    if (!good && !other) left.degenerate.push_back(number);
-    if (!good) return !shorter_is_first;
+    const auto other = [&] { return sound(q, !shorter_is_first, vertices); };
+    if (!sound(q, shorter_is_first, vertices)) {
+      if (!other()) left.degenerate.push_back(number);
+      return !shorter_is_first;
+    }
     if (stand_in_) return shorter_is_first;
     std::array<Vec3d, 4> corners;
     for (std::size_t k = 0; k < 4; ++k) corners[k] = to_double(vertices.at(q[k]));
     if (no_diagonal(corners, voxel_mm_, shorter_is_first)) left.astray.push_back(number);
-    return wrong_diagonal(corners, voxel_mm_, shorter_is_first) && other ? !shorter_is_first : shorter_is_first;
+    return wrong_diagonal(corners, voxel_mm_, shorter_is_first) && other() ? !shorter_is_first : shorter_is_first;
   };
   const auto some = [&](const tbb::blocked_range<std::size_t>& range, Left left) {
     Choice choice;

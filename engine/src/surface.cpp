@@ -104,7 +104,7 @@ struct FinishedLayer {
 };
 
 /// The layers' last step, one after another: moved, split. A layer is done when the next one has been looked at, which
-/// may shake its vertices.
+/// may move its vertices.
 class Finisher {
  public:
   using Use = std::function<void(FinishedLayer&)>;  ///< Which may swap it for another, to be written over.
@@ -190,6 +190,7 @@ class Finisher {
       for (std::size_t& i : *list) i = touched[i];
   }
   void move(std::uint32_t v, Vec3f to) {
+    if (v - first_ < before_) return;  // handed on already
     points_[v - first_] = to;
     moved_[v - first_] = 1;
   }
@@ -214,7 +215,6 @@ class Finisher {
     const std::optional<int> axis = along ? along : no_diagonal(corners, voxel_mm_, false);
     if (!axis) return;  // a neighbour has mended it
     for (std::size_t k = 0; k < 4; ++k) {
-      if (quad[k] - first_ < before_) continue;
       Vec3f p = points_[quad[k] - first_];
       (*axis == 0 ? p.x : *axis == 1 ? p.y : p.z) = static_cast<float>(0.5 * (corners[k][*axis] + middle[*axis]));
       move(quad[k], p);
