@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "closed_fan.h"
-#include "dual_surface.h"
 #include "layer_sums.h"
 #include "layer_weld.h"
 #include "shared_sets.h"
+#include "unwritten.h"
 
 namespace fibrolite {
 namespace {

@@ -8,33 +8,15 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <new>
-#include <utility>
 #include <vector>
 
 #include "fibrolite/context.h"
 #include "fibrolite/solid.h"
+#include "unwritten.h"
 
 namespace fibrolite {
 
 using Quad = std::array<std::uint32_t, 4>;  ///< Of vertices, counter-clockwise from outside.
-
-/// Leaves new elements as they are: they are written over in parallel, which also shares out the cost of fresh memory.
-template <class T>
-struct Unwritten : std::allocator<T> {
-  template <class U>
-  struct rebind {  // NOLINT(readability-identifier-naming): the name the standard asks for
-    using other = Unwritten<U>;
-  };
-  template <class U, class... Args>
-  void construct(U* at, Args&&... args) {
-    if constexpr (sizeof...(Args) == 0) {
-      ::new (static_cast<void*>(at)) U;
-    } else {
-      ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
-    }
-  }
-};
 
 using Points = std::vector<openvdb::Vec3s, Unwritten<openvdb::Vec3s>>;
 using Quads = std::vector<Quad, Unwritten<Quad>>;
