@@ -138,6 +138,7 @@ class ClosedChecker {
         Range(looked_at_, end, 1024), std::int64_t{0},
         [&](const Range& range, std::int64_t used) {
           bool good = closed.load(std::memory_order_relaxed);
+          auto& mine = bridges.local();
           for (std::size_t i = range.begin(); i < range.end() && good; ++i) {
             const auto v = static_cast<std::uint32_t>(i);
             const std::uint32_t count = counts_[v & mask_];
@@ -145,11 +146,11 @@ class ClosedChecker {
             ++used;
             if (count <= 8) {
               good = count >= 3 && is_closed(fans_[v & mask_], count);
-              connect(v, fans_[v & mask_], bridges.local());
+              connect(v, fans_[v & mask_], mine);
             } else {
               const Fan<16> fan = whole(fans_[v & mask_], more_of(v), count);
               good = is_closed(fan, count);
-              connect(v, fan, bridges.local());
+              connect(v, fan, mine);
             }
           }
           if (!good) closed = false;

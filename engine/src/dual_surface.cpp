@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dual_surface.h"
 
-#include <openvdb/tree/LeafManager.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <bit>
@@ -11,6 +11,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
 #include "fibrolite/clones.h"
@@ -29,6 +30,10 @@ using Access = openvdb::tree::ValueAccessor<const Tree>;
 // ---- one cell ----
 // Corner c lies at bits 0, 1, 2 of c along x, y, z. Edge 4 a + p + 2 q runs along axis a from the corner with bits p
 // and q along the next axes. Face 2 a + s is the one at s along axis a.
+
+/// A number known to the compiler.
+template <unsigned n>
+using Number = std::integral_constant<unsigned, n>;
 
 constexpr int edges = 12, faces = 6, no_face = faces;
 
@@ -144,8 +149,9 @@ const Tables& tables() {
 struct Block {
   Coord origin;
   std::array<std::uint16_t, 81> inside;  ///< Bit z of [9 x + y]: sample (x, y, z) of the block and the next ones.
-  std::array<std::uint16_t, Leaf::SIZE> first;  ///< Vertex of each mixed cell's first sheet, in the block.
-  std::array<std::uint16_t, Leaf::SIZE> kind;   ///< 8 bits of corners inside, then the joined face.
+  static constexpr unsigned several = 1U << 15;  ///< In `first`: of a cell with more than one sheet.
+  std::array<std::uint16_t, Leaf::SIZE> first;   ///< Vertex of each mixed cell's first sheet, in the block.
+  std::array<std::uint16_t, Leaf::SIZE> kind;    ///< 8 bits of corners inside, then the joined face.
   std::vector<openvdb::Vec3s> points;
   std::size_t base = 0;   ///< Of its vertices among all.
   std::size_t quads = 0;  ///< How many.
@@ -236,25 +242,20 @@ class Cells {
     const Sheets& sheets = tables().sheets[inside][joined];
     const std::size_t at = 64 * x + 8 * y + z;
     block_.kind[at] = static_cast<std::uint16_t>(inside | joined << 8);
-    block_.first[at] = static_cast<std::uint16_t>(points_.size());
+    block_.first[at] = static_cast<std::uint16_t>(points_.size() | (sheets.count == 1 ? 0 : Block::several));
 
-    std::array<float, 8> v;
-    for (unsigned c = 0; c < 8; ++c) v[c] = samples_.value[((x + (c & 1U)) * 9 + y + (c >> 1 & 1U)) * 9 + z + (c >> 2)];
+    const float* const lowest = samples_.value.data() + (9 * x + y) * 9 + z;
+    const std::array<float, 8> v{lowest[0], lowest[81], lowest[9],  lowest[90],
+                                 lowest[1], lowest[82], lowest[10], lowest[91]};
     const CrossedEdges& crossed = tables().crossed[inside];
     const openvdb::Vec3s corner(static_cast<float>(block_.origin.x() + static_cast<int>(x)),
                                 static_cast<float>(block_.origin.y() + static_cast<int>(y)),
                                 static_cast<float>(block_.origin.z() + static_cast<int>(z)));
-    std::array<std::array<float, 3>, 4> sum{};  // of each sheet
-    if (sheets.count == 1) {                    // nearly always
-      sum[0] = crossed.corners;
-      for (std::size_t n = 0; n < crossed.count; ++n) {
-        const unsigned e = crossed.list[n];
-        const float a = v[edge(e).from];
-        sum[0][e / 4] += a / (a - v[edge(e).to]);
-      }
-      points_.push_back(placed(corner, sum[0], static_cast<float>(crossed.count)));
+    if (sheets.count == 1) {  // nearly always
+      points_.push_back(placed(corner, sum_of_crossings(v, crossed.corners), static_cast<float>(crossed.count)));
       return;
     }
+    std::array<std::array<float, 3>, 4> sum{};  // of each sheet
     std::array<float, 4> number{};
     for (std::size_t n = 0; n < crossed.count; ++n) {
       const unsigned e = crossed.list[n];
@@ -268,6 +269,20 @@ class Cells {
       number[sheets.of[e]] += 1;
     }
     for (std::size_t s = 0; s < sheets.count; ++s) points_.push_back(placed(corner, sum[s], number[s]));
+  }
+  /// Of all crossed edges, with where they begin: one edge along each axis at a time, side by side.
+  static std::array<float, 3> sum_of_crossings(const std::array<float, 8>& v, const std::array<float, 3>& begin) {
+    using Four [[gnu::vector_size(16)]] = float;
+    Four sum{begin[0], begin[1], begin[2], 0};
+    const auto add = [&](float ax, float ay, float az, float bx, float by, float bz) {
+      const Four a{ax, ay, az, 0}, b{bx, by, bz, 0}, along = a / (a - b);
+      sum += ((a < 0) ^ (b < 0)) ? along : Four{};
+    };
+    add(v[0], v[0], v[0], v[1], v[2], v[4]);
+    add(v[2], v[4], v[1], v[3], v[6], v[5]);
+    add(v[4], v[1], v[2], v[5], v[3], v[6]);
+    add(v[6], v[5], v[3], v[7], v[7], v[7]);
+    return {sum[0], sum[1], sum[2]};
   }
   [[nodiscard]] openvdb::Vec3s placed(const openvdb::Vec3s& corner, const std::array<float, 3>& sum,
                                       float number) const {
@@ -310,25 +325,28 @@ struct DualSurface::Impl {
 
   /// Blocks that may have mixed cells, layer by layer: leaves, and tiles below a leaf's face of another sign.
   [[nodiscard]] std::vector<Coord> candidates(const Tree& tree, const SampleRange& range) const {
-    const openvdb::tree::LeafManager<const Tree> leaves(tree);
-    std::vector<std::vector<Coord>> found(leaves.leafCount());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, found.size(), 64), [&](const auto& some) {
+    std::vector<const Leaf*> leaves;
+    leaves.reserve(tree.leafCount());
+    tree.getNodes(leaves);
+    constexpr std::size_t share = 1024;
+    std::vector<std::vector<Coord>> found((leaves.size() + share - 1) / share);
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t part) {
       const Access access(tree);
-      for (std::size_t i = some.begin(); i < some.end(); ++i) {
-        const Leaf& leaf = leaves.leaf(i);
+      for (std::size_t i = part * share; i < std::min((part + 1) * share, leaves.size()); ++i) {
+        const Leaf& leaf = *leaves[i];
         const Coord o = leaf.origin();
         if (o[axis] < range.low || o[axis] > range.high) continue;
-        if (o[axis] < range.high) found[i].push_back(o);
+        if (o[axis] < range.high) found[part].push_back(o);
         for (int n = 1; n < 8; ++n) {
           const Coord low = o.offsetBy(-8 * (n >> 2), -8 * (n >> 1 & 1), -8 * (n & 1));
           if (low[axis] < range.low || low[axis] >= range.high || access.probeConstLeaf(low) != nullptr) continue;
-          if (other_side(leaf, n, access.getValue(low) < 0)) found[i].push_back(low);
+          if (other_side(leaf, n, access.getValue(low) < 0)) found[part].push_back(low);
         }
       }
     });
     std::vector<Coord> all;
     for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
-    std::sort(all.begin(), all.end(), [&](const Coord& a, const Coord& b) { return key(a) < key(b); });
+    tbb::parallel_sort(all.begin(), all.end(), [&](const Coord& a, const Coord& b) { return key(a) < key(b); });
     all.erase(std::unique(all.begin(), all.end()), all.end());
     return all;
   }
@@ -400,21 +418,31 @@ struct DualSurface::Impl {
       lower[static_cast<std::size_t>(n)] = find(o[axis] == block.origin[axis] ? layer : below, o);
     }
     const auto vertex = [&](int x, int y, int z, unsigned e) {
-      const auto n = static_cast<std::size_t>((x < 0 ? 4 : 0) | (y < 0 ? 2 : 0) | (z < 0 ? 1 : 0));
-      const Block& in = *lower[n];
+      const Block& in = (x | y | z) >= 0 ? block : *lower[(x < 0 ? 4U : 0U) | (y < 0 ? 2U : 0U) | (z < 0 ? 1U : 0U)];
       const auto at = static_cast<std::size_t>(64 * (x & 7) + 8 * (y & 7) + (z & 7));
-      const unsigned kind = in.kind[at];
-      return static_cast<std::uint32_t>(in.base + in.first[at] + tables().sheets[kind & 255U][kind >> 8].of[e]);
+      const unsigned first = in.first[at];
+      if ((first & Block::several) == 0) return static_cast<std::uint32_t>(in.base + first);
+      const unsigned kind = in.kind[at], sheet = tables().sheets[kind & 255U][kind >> 8].of[e];
+      return static_cast<std::uint32_t>(in.base + (first & ~Block::several) + sheet);
     };
-    const auto quad = [&](int x, int y, int z, unsigned along, bool inside) {
-      Quad& q = *next++;
-      constexpr std::array<unsigned, 4> circle{0, 1, 3, 2};  // bits for a step down along the next axes
-      for (std::size_t k = 0; k < 4; ++k) {
-        std::array<int, 3> cell{x, y, z};
-        cell[(along + 1) % 3] -= static_cast<int>(circle[k] & 1U);
-        cell[(along + 2) % 3] -= static_cast<int>(circle[k] >> 1);
-        q[inside ? k : 3 - k] = vertex(cell[0], cell[1], cell[2], 4 * along + circle[k]);
-      }
+    // Bits of `circle` are steps down along the next two axes.
+    const auto corner = [&]<unsigned along, unsigned circle>(Number<along>, Number<circle>, int x, int y, int z) {
+      constexpr int u = circle & 1U, v = circle >> 1;
+      constexpr int dx = along == 2   ? u
+                         : along == 1 ? v
+                                      : 0,
+                    dy = along == 0   ? u
+                         : along == 2 ? v
+                                      : 0,
+                    dz = along == 1   ? u
+                         : along == 0 ? v
+                                      : 0;
+      return vertex(x - dx, y - dy, z - dz, 4 * along + circle);
+    };
+    const auto quad = [&](auto along, int x, int y, int z, bool inside) {
+      const std::uint32_t a = corner(along, Number<0>{}, x, y, z), b = corner(along, Number<1>{}, x, y, z),
+                          c = corner(along, Number<3>{}, x, y, z), d = corner(along, Number<2>{}, x, y, z);
+      *next++ = inside ? Quad{a, b, c, d} : Quad{d, c, b, a};
     };
     for (int x = 0; x < 8; ++x) {
       for (int y = 0; y < 8; ++y) {
@@ -422,8 +450,10 @@ struct DualSurface::Impl {
         const std::array<unsigned, 3> crossed = block.crossed(static_cast<unsigned>(x), static_cast<unsigned>(y));
         for (unsigned any = crossed[0] | crossed[1] | crossed[2]; any != 0; any &= any - 1) {
           const int z = std::countr_zero(any);
-          for (unsigned along = 0; along < 3; ++along)
-            if ((crossed[along] >> z & 1U) != 0) quad(x, y, z, along, (row >> z & 1U) != 0);
+          const bool inside = (row >> z & 1U) != 0;
+          if ((crossed[0] >> z & 1U) != 0) quad(Number<0>{}, x, y, z, inside);
+          if ((crossed[1] >> z & 1U) != 0) quad(Number<1>{}, x, y, z, inside);
+          if ((crossed[2] >> z & 1U) != 0) quad(Number<2>{}, x, y, z, inside);
         }
       }
     }
