@@ -156,6 +156,7 @@ void generate(const GenerateOptions& options) {
   model = {};
   if (options.pictures.files.empty()) hybrid.body = {};
   stage("write solid", [&] {
+    if (std::ranges::any_of(options.output.files, is_vdb)) hybrid.solid = narrowed(std::move(hybrid.solid));
     for (const fs::path& file : options.output.files)
       if (is_vdb(file)) write_vdb(outputs.place(file), {{"solid", hybrid.solid}}, context.part(0.75, 0.78, "write"));
     if (options.steps) write_vdb(outputs.place(*options.steps), hybrid.steps, context.part(0.78, 0.8, "write"));

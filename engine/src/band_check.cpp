@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "band_check.h"
 
-#include <openvdb/tree/LeafManager.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -115,13 +114,12 @@ void inner_tiles_at_the_outside(const Tree& tree, const openvdb::CoordBBox& know
   }
 }
 
-}  // namespace
-
-std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openvdb::CoordBBox& box) {
-  const openvdb::tree::LeafManager<const Tree> leaves(tree);
+/// Among these leaves; each meets its neighbours in the box, those before it as far as they are among them too.
+std::vector<Coord> contradictions_of(const std::vector<const Leaf*>& leaves, const Tree& tree, double voxel_mm,
+                                     const openvdb::CoordBBox& box) {
   const auto limit = static_cast<float>(voxel_mm * 1.01);
   // One bit per direction of the face (-x +x -y +y -z +z) and one for the inside.
-  std::vector<unsigned char> found(leaves.leafCount(), 0);
+  std::vector<unsigned char> found(leaves.size(), 0);
   const auto neighbour = [](const Coord& origin, int face) {
     Coord place = origin;
     place[static_cast<std::size_t>(face / 2)] += face % 2 == 1 ? 8 : -8;
@@ -130,7 +128,8 @@ std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openv
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, found.size(), 64), [&](const auto& range) {
     openvdb::tree::ValueAccessor<const Tree> access(tree);
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const Leaf& leaf = leaves.leaf(i);
+      fetch_ahead(leaves, i);
+      const Leaf& leaf = *leaves[i];
       const float* v = leaf.buffer().data();
       const LeafBits side = bits_below(v, 0);
       unsigned bits = within(v, side, limit) ? 64U : 0U;
@@ -150,15 +149,44 @@ std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openv
   std::vector<Coord> blocks;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i] == 0) continue;
-    blocks.push_back(leaves.leaf(i).origin());
+    blocks.push_back(leaves[i]->origin());
     for (int face = 0; face < 6; ++face) {
-      if ((found[i] >> face & 1) != 0) blocks.push_back(neighbour(leaves.leaf(i).origin(), face));
+      if ((found[i] >> face & 1) != 0) blocks.push_back(neighbour(leaves[i]->origin(), face));
     }
   }
   inner_tiles_at_the_outside(tree, box, blocks);
   std::sort(blocks.begin(), blocks.end());
   blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
   return blocks;
+}
+
+}  // namespace
+
+std::vector<Coord> contradictions(const Tree& tree, double voxel_mm, const openvdb::CoordBBox& box) {
+  std::vector<const Leaf*> leaves;
+  leaves.reserve(tree.leafCount());
+  tree.getNodes(leaves);
+  return contradictions_of(leaves, tree, voxel_mm, box);
+}
+
+std::vector<Coord> contradictions_around(const std::vector<openvdb::CoordBBox>& changed, const Tree& tree,
+                                         double voxel_mm) {
+  std::vector<const Leaf*> leaves;
+  openvdb::tree::ValueAccessor<const Tree> access(tree);
+  for (openvdb::CoordBBox part : changed) {
+    part.expand(8);
+    for (int x = part.min().x(); x <= part.max().x(); x += 8) {
+      for (int y = part.min().y(); y <= part.max().y(); y += 8) {
+        for (int z = part.min().z(); z <= part.max().z(); z += 8) {
+          if (const Leaf* leaf = access.probeConstLeaf(Coord(x, y, z))) leaves.push_back(leaf);
+        }
+      }
+    }
+  }
+  const auto place = [](const Leaf* leaf) { return leaf->origin(); };
+  std::ranges::sort(leaves, {}, place);
+  leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+  return contradictions_of(leaves, tree, voxel_mm, openvdb::CoordBBox::inf());
 }
 
 }  // namespace fibrolite

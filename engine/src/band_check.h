@@ -14,5 +14,9 @@ namespace fibrolite {
 /// parallel.
 [[nodiscard]] std::vector<openvdb::Coord> contradictions(const openvdb::FloatTree& tree, double voxel_mm,
                                                          const openvdb::CoordBBox& box = openvdb::CoordBBox::inf());
+/// After `changed` (whole blocks, none in two of them) was filled again: all that has to do with it, and maybe others.
+/// Cost: O(tiles and changed leaves), parallel.
+[[nodiscard]] std::vector<openvdb::Coord> contradictions_around(const std::vector<openvdb::CoordBBox>& changed,
+                                                                const openvdb::FloatTree& tree, double voxel_mm);
 
 }  // namespace fibrolite

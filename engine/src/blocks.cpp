@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 
+#include "inner_tiles.h"
 #include "vdb_access.h"
 
 namespace fibrolite {
@@ -19,11 +20,7 @@ std::vector<Vec3i> blocks(const Solid& solid) {
     const openvdb::Coord o = leaf->origin();
     origins.push_back({o.x(), o.y(), o.z()});
   }
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile >= 0) continue;
-    const openvdb::CoordBBox box = tile.getBoundingBox();
+  for (const openvdb::CoordBBox& box : inner_tiles(tree)) {
     for (int x = box.min().x(); x <= box.max().x(); x += 8) {
       for (int y = box.min().y(); y <= box.max().y(); y += 8) {
         for (int z = box.min().z(); z <= box.max().z(); z += 8) origins.push_back({x, y, z});

@@ -6,30 +6,53 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
+#include <cstring>
 #include <numeric>
 
+#include "fibrolite/clones.h"
 #include "fibrolite/error.h"
+#include "inner_tiles.h"
 
 namespace fibrolite {
 namespace {
 
-/// All of `within` that hangs together with what is set in `grown`. Whole planes move at a time.
-void flood(LeafBits& grown, const LeafBits& within) {
-  for (bool changed = true; changed;) {
-    changed = false;
-    const auto spread = [&](std::size_t x, std::uint64_t from) {
-      std::uint64_t now = (grown[x] | from) & within[x];
-      for (std::uint64_t before = ~now; now != before;) {
-        before = now;
-        now |= (now << 1 & ~first_column) | (now & ~first_column) >> 1 | now << 8 | now >> 8;
-        now &= within[x];
-      }
-      changed = changed || now != grown[x];
-      grown[x] = now;
-    };
-    for (std::size_t x = 0; x < 8; ++x) spread(x, x > 0 ? grown[x - 1] : 0);
-    for (std::size_t x = 7; x-- > 0;) spread(x, grown[x + 1]);
+using Planes [[gnu::vector_size(64)]] = std::uint64_t;
+
+/// Fills lines of samples in both directions, all at once: `step` bits apart, where no bit of `first` and `last` has a
+/// neighbour before and after it. Fills twice as far each time (Kogge and Stone 1973).
+template <int step>
+[[gnu::always_inline]] inline void fill_lines(Planes& grown, const Planes& within, std::uint64_t first,
+                                              std::uint64_t last) {
+  Planes way = within & ~first;
+  grown |= way & grown << step;
+  way &= way << step;
+  grown |= way & grown << 2 * step;
+  way &= way << 2 * step;
+  grown |= way & grown << 4 * step;
+  way = within & ~last;
+  grown |= way & grown >> step;
+  way &= way >> step;
+  grown |= way & grown >> 2 * step;
+  way &= way >> 2 * step;
+  grown |= way & grown >> 4 * step;
+}
+
+/// All of `within` that hangs together with what is set in `grown`.
+FIBROLITE_CLONES void flood(LeafBits& grown, const LeafBits& within) {
+  Planes all;
+  std::memcpy(&all, within.data(), sizeof all);
+  for (LeafBits before = within; before != grown;) {
+    before = grown;
+    for (std::size_t x = 1; x < 8; ++x) grown[x] |= grown[x - 1] & within[x];
+    for (std::size_t x = 7; x-- > 0;) grown[x] |= grown[x + 1] & within[x];
+    Planes now;
+    std::memcpy(&now, grown.data(), sizeof now);
+    fill_lines<1>(now, all, first_column, first_column << 7);
+    fill_lines<8>(now, all, 0, 0);
+    std::memcpy(grown.data(), &now, sizeof now);
+    if (grown == within) return;
   }
 }
 
@@ -44,40 +67,28 @@ void label_leaf(const float* value, float below, std::vector<LeafSet>& sets) {
       const bool in = (inside[x] >> bit & 1U) != 0;
       LeafBits within;
       for (std::size_t w = 0; w < 8; ++w) within[w] = open[w] & (in ? inside[w] : ~inside[w]);
-      LeafSet& set = sets.emplace_back(LeafSet{{}, in});
+      LeafSet& set = sets.emplace_back(LeafSet{{}, 0, static_cast<std::uint16_t>(64 * x + bit), in});
       set.bits[x] = std::uint64_t{1} << bit;
       flood(set.bits, within);
-      for (std::size_t w = 0; w < 8; ++w) open[w] &= ~set.bits[w];
+      int voxels = 0;
+      for (std::size_t w = 0; w < 8; ++w) {
+        open[w] &= ~set.bits[w];
+        voxels += std::popcount(set.bits[w]);
+      }
+      set.voxels = static_cast<std::uint16_t>(voxels);
     }
   }
 }
 
 }  // namespace
 
-int LeafSet::voxels() const {
-  int count = 0;
-  for (const std::uint64_t word : bits) count += std::popcount(word);
-  return count;
-}
-
-unsigned LeafSet::first() const {
-  unsigned x = 0;
-  while (bits[x] == 0) ++x;
-  return 64 * x + static_cast<unsigned>(std::countr_zero(bits[x]));
-}
-
 Components::Components(const Solid& solid, const Context& context, float below, const SampleRange* range)
     : solid_(solid), below_(below) {
   const Tree& tree = solid.impl().grid->tree();
   openvdb::CoordBBox box;
   tree.evalLeafBoundingBox(box);
-  openvdb::CoordBBox tiles;
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile < 0) tiles.expand(tile.getBoundingBox());
-  }
-  box.expand(tiles);
+  const std::vector<openvdb::CoordBBox> tiles = inner_tiles(tree);
+  for (const openvdb::CoordBBox& tile : tiles) box.expand(tile);
   if (box.empty()) return;
   low_ = openvdb::Coord((box.min().x() >> 3) - 1, (box.min().y() >> 3) - 1, (box.min().z() >> 3) - 1);
   n_ = openvdb::Coord((box.max().x() >> 3) + 2, (box.max().y() >> 3) + 2, (box.max().z() >> 3) + 2) - low_;
@@ -85,39 +96,20 @@ Components::Components(const Solid& solid, const Context& context, float below, 
     low_[static_cast<std::size_t>(range->axis)] = range->low >> 3;
     n_[static_cast<std::size_t>(range->axis)] = (range->high - range->low) >> 3;
   }
-  find_blocks(tree);
+  find_blocks(tree, tiles);
   context.check();
   label(context);
   join();
-}
-
-std::vector<Components::Component> Components::list() const {
-  std::vector<Component> result;
-  std::vector<std::int64_t> slot(parent_.size(), -1);
-  each_block([&](const openvdb::Coord& origin, const LeafLabels* labels, Id offset) {
-    const std::size_t count = labels != nullptr ? labels->sets.size() : 1;
-    for (std::size_t k = 0; k < count; ++k) {
-      const Id root = find(offset + static_cast<Id>(k));
-      if (slot[root] < 0) {
-        slot[root] = static_cast<std::int64_t>(result.size());
-        const unsigned first = labels != nullptr ? labels->sets[k].first() : 0;
-        const openvdb::Coord at =
-            origin + openvdb::Coord(static_cast<int>(first >> 6), static_cast<int>((first >> 3) & 7U),
-                                    static_cast<int>(first & 7U));
-        result.push_back({root, inside(at), 0, at});
-      }
-      result[static_cast<std::size_t>(slot[root])].voxels += labels != nullptr ? labels->sets[k].voxels() : Leaf::SIZE;
-    }
-  });
-  return result;
+  number();
+  count_voxels();
 }
 
 Components::Id Components::at(const openvdb::Coord& ijk) const {
   const openvdb::Coord b = openvdb::Coord(ijk.x() >> 3, ijk.y() >> 3, ijk.z() >> 3) - low_;
-  if (b.x() < 0 || b.y() < 0 || b.z() < 0 || b.x() >= n_.x() || b.y() >= n_.y() || b.z() >= n_.z()) return find(0);
+  if (b.x() < 0 || b.y() < 0 || b.z() < 0 || b.x() >= n_.x() || b.y() >= n_.y() || b.z() >= n_.z()) return exterior;
   const std::size_t i = index(b);
-  if (block_[i] < 0) return find(offset_[i]);
-  return find(offset_[i] + static_cast<Id>(labels_of(block_[i]).at(Leaf::coordToOffset(ijk))));
+  if (block_[i] < 0) return component_[offset_[i]];
+  return component_[offset_[i] + labels_of(block_[i]).at(Leaf::coordToOffset(ijk))];
 }
 
 openvdb::Coord Components::origin(std::size_t b) const {
@@ -128,7 +120,7 @@ openvdb::Coord Components::origin(std::size_t b) const {
   return openvdb::Coord((x + low_.x()) * 8, (y + low_.y()) * 8, (z + low_.z()) * 8);
 }
 
-void Components::find_blocks(const Tree& tree) {
+void Components::find_blocks(const Tree& tree, const std::vector<openvdb::CoordBBox>& tiles) {
   const double count = 1.0 * n_.x() * n_.y() * n_.z();
   if (count > 2e9) {
     throw Error(Code::TooLarge, "the solid is too large to count its pieces", {}, "use a larger --voxel");
@@ -145,11 +137,7 @@ void Components::find_blocks(const Tree& tree) {
     const openvdb::Coord o = tree_leaves_[i]->origin();
     block_[index(openvdb::Coord(o.x() >> 3, o.y() >> 3, o.z() >> 3) - low_)] = static_cast<std::int32_t>(i);
   });
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile >= 0) continue;
-    openvdb::CoordBBox part = tile.getBoundingBox();
+  for (openvdb::CoordBBox part : tiles) {
     part.intersect(box);
     for (int x = part.min().x() >> 3; x <= part.max().x() >> 3; ++x) {
       for (int y = part.min().y() >> 3; y <= part.max().y() >> 3; ++y) {
@@ -170,6 +158,7 @@ void Components::label(const Context& context) {
     Chunk& chunk = chunks_[c];
     for (std::size_t i = 0; i < chunk_size; ++i) {
       const std::size_t leaf = c * chunk_size + i;
+      fetch_ahead(tree_leaves_, leaf);
       if (leaf < tree_leaves_.size()) label_leaf(tree_leaves_[leaf]->buffer().data(), below_, room);
       chunk.start[i + 1] = static_cast<std::uint16_t>(room.size());
     }
@@ -183,20 +172,20 @@ void Components::label(const Context& context) {
     next += block_[b] >= 0 ? static_cast<Id>(labels_of(block_[b]).sets.size()) : 1U;
   }
   offset_.back() = next;
-  parent_.resize(next);
-  std::iota(parent_.begin(), parent_.end(), Id{0});
+  component_.resize(next);
+  std::iota(component_.begin(), component_.end(), Id{0});
 }
 
 /// The smaller id becomes the root, so the result does not depend on the order of joining.
 void Components::unite(Id a, Id b) {
   a = root_of(a);
   b = root_of(b);
-  if (a != b) parent_[std::max(a, b)] = std::min(a, b);
+  if (a != b) component_[std::max(a, b)] = std::min(a, b);
 }
 Components::Id Components::root_of(Id i) {
-  while (parent_[i] != i) {
-    parent_[i] = parent_[parent_[i]];
-    i = parent_[i];
+  while (component_[i] != i) {
+    component_[i] = component_[component_[i]];
+    i = component_[i];
   }
   return i;
 }
@@ -212,7 +201,57 @@ void Components::join() {
     }
   });
   for (int share = 1; share < shares; ++share) join_to_next(first(share) - 1);
-  for (Id i = 0; i < parent_.size(); ++i) parent_[i] = parent_[parent_[i]];  // a parent is smaller, and done already
+}
+
+/// A component's root is its smallest label, and labels are in scan order: so are the roots.
+void Components::number() {
+  for (std::size_t b = 0; b < block_.size(); ++b) {
+    for (Id i = offset_[b]; i < offset_[b + 1]; ++i) {
+      if (component_[i] != i) {
+        component_[i] = component_[component_[i]];  // smaller than i, and has its number already
+        continue;
+      }
+      const auto id = static_cast<Id>(list_.size());
+      component_[i] = id;
+      Component& found = list_.emplace_back(Component{id, block_[b] == full_tile, 0, origin(b)});
+      if (block_[b] < 0) continue;
+      const LeafSet& set = labels_of(block_[b]).sets[i - offset_[b]];
+      found.inside = set.inside;
+      found.first += Leaf::offsetToLocalCoord(set.first);
+    }
+  }
+}
+
+void Components::count_voxels() {
+  std::vector<std::atomic<std::int64_t>> voxels(list_.size());
+  const std::size_t layer = index(openvdb::Coord(1, 0, 0));
+  tbb::parallel_for(0, n_.x(), [&](int x) {
+    // Mostly one component on each side.
+    struct Run {
+      Id of = exterior;
+      std::int64_t voxels = 0;
+    };
+    std::array<Run, 2> runs;
+    const auto add = [&](Id component, int count) {
+      Run& run = runs[list_[component].inside ? 1 : 0];
+      if (run.of != component) {
+        voxels[run.of].fetch_add(run.voxels, std::memory_order_relaxed);
+        run = {component, 0};
+      }
+      run.voxels += count;
+    };
+    const std::size_t first = index(openvdb::Coord(x, 0, 0));
+    for (std::size_t b = first; b < first + layer; ++b) {
+      if (block_[b] < 0) {
+        add(component_[offset_[b]], Leaf::SIZE);
+        continue;
+      }
+      Id label = offset_[b];
+      for (const LeafSet& set : labels_of(block_[b]).sets) add(component_[label++], set.voxels);
+    }
+    for (const Run& run : runs) voxels[run.of].fetch_add(run.voxels, std::memory_order_relaxed);
+  });
+  for (Component& one : list_) one.voxels = voxels[one.id].load(std::memory_order_relaxed);
 }
 
 /// The blocks of a layer, along y and z.

@@ -22,10 +22,9 @@ namespace fibrolite {
 /// Samples of one label.
 struct LeafSet {
   LeafBits bits;
+  std::uint16_t voxels;
+  std::uint16_t first;  ///< Its first sample: 64 x + 8 y + z.
   bool inside;
-
-  [[nodiscard]] int voxels() const;
-  [[nodiscard]] unsigned first() const;  ///< Its first sample: 64 x + 8 y + z.
 };
 
 /// One leaf's labels, dense from 0 in scan order.
@@ -60,24 +59,28 @@ class Components {
     std::int64_t voxels;
     openvdb::Coord first;
   };
-  /// Joined components in scan order of their first voxel. The exterior is the first of all.
-  [[nodiscard]] std::vector<Component> list() const;
+  static constexpr Id exterior = 0;
+  /// Joined components in scan order of their first voxel, each at the place of its id. The exterior is the first of
+  /// all.
+  [[nodiscard]] const std::vector<Component>& list() const { return list_; }
 
-  /// Root id of a sample; samples outside the box belong to the exterior.
+  /// Component of a sample; samples outside the box belong to the exterior.
   [[nodiscard]] Id at(const openvdb::Coord& ijk) const;
   [[nodiscard]] bool inside(const openvdb::Coord& ijk) const {
     return solid_.impl().grid->tree().getValue(ijk) < below_;
   }
 
-  /// Calls visit(origin, leaf labels or null for a tile, global id of label 0) for each block, in scan order.
+  /// Calls visit(origin, leaf labels or null for a tile, component of each label) for each block that is not all
+  /// exterior, in scan order.
   template <class Visit>
   void each_block(const Visit& visit) const {
     for (std::size_t b = 0; b < block_.size(); ++b) {
+      const std::span<const Id> of(component_.data() + offset_[b], offset_[b + 1] - offset_[b]);
+      if (of.size() == 1 && of[0] == exterior) continue;
       const LeafLabels labels = block_[b] >= 0 ? labels_of(block_[b]) : LeafLabels{};
-      visit(origin(b), block_[b] >= 0 ? &labels : nullptr, offset_[b]);
+      visit(origin(b), block_[b] >= 0 ? &labels : nullptr, of);
     }
   }
-  [[nodiscard]] Id find(Id i) const { return parent_[i]; }
 
  private:
   static constexpr std::int32_t void_tile = -1, full_tile = -2;
@@ -100,7 +103,7 @@ class Components {
     const std::size_t from = chunk.start[n % chunk_size], to = chunk.start[n % chunk_size + 1];
     return {{chunk.sets.data() + from, to - from}};
   }
-  void find_blocks(const Tree& tree);
+  void find_blocks(const Tree& tree, const std::vector<openvdb::CoordBBox>& tiles);
   void label(const Context& context);
   void join();
   void join_across(int x);
@@ -108,6 +111,8 @@ class Components {
   void join_faces(std::size_t a, std::size_t b, unsigned axis);
   void unite(Id a, Id b);
   Id root_of(Id i);
+  void number();
+  void count_voxels();
 
   Solid solid_;
   float below_;
@@ -115,8 +120,9 @@ class Components {
   std::vector<std::int32_t> block_;  // leaf number or a tile kind
   std::vector<const Leaf*> tree_leaves_;
   std::vector<Chunk> chunks_;
-  std::vector<Id> offset_;  // first global id of each block
-  std::vector<Id> parent_;  // the root itself, once all are joined
+  std::vector<Id> offset_;     // first label of each block
+  std::vector<Id> component_;  // of each label; while they are joined, one that it hangs together with
+  std::vector<Component> list_;
 };
 
 [[nodiscard]] Vec3d world_mm(const openvdb::Coord& c, double voxel_mm);

@@ -3,9 +3,24 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace fibrolite {
+
+/// A leaf's samples lie anywhere in memory: asked for some leaves ahead, they are there in time. `leaves` are pointers.
+template <class Leaves>
+void fetch_ahead(const Leaves& leaves, std::size_t now) {
+  constexpr std::size_t leaf_ahead = 12, samples_ahead = 4;
+  if (now + leaf_ahead < leaves.size()) {
+    const char* const leaf = reinterpret_cast<const char*>(leaves[now + leaf_ahead]);  // knows where its samples are
+    __builtin_prefetch(leaf);
+    __builtin_prefetch(leaf + 64);
+  }
+  if (now + samples_ahead >= leaves.size()) return;
+  const float* const value = leaves[now + samples_ahead]->buffer().data();
+  for (int i = 0; i < 512; i += 16) __builtin_prefetch(value + i);
+}
 
 /// Bit 8 y + z of word x.
 using LeafBits = std::array<std::uint64_t, 8>;

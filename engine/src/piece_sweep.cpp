@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -22,7 +23,7 @@ using Id = std::uint32_t;
 using Tree = Components::Tree;
 using openvdb::Coord;
 
-constexpr Id exterior = 0;
+constexpr Id exterior = Components::exterior;
 
 std::tuple<int, int, int> key(const Vec3i& v) { return {v.x, v.y, v.z}; }
 
@@ -127,26 +128,20 @@ struct PieceSweep::Impl {
   void take(const Components& components, const SampleRange& range, const Shape& anchor, const Solid* solid,
             std::map<std::pair<int, int>, Face>& next, const Context& context) {
     // The slab's components get numbers of their own.
-    const auto list = components.list();
-    std::map<Id, Id> number{{list.front().id, exterior}};
+    const auto& list = components.list();
+    const auto numbers = static_cast<Id>(sets.size()) - 1;  // of those before
+    const auto number = [&](Id component) { return component == exterior ? exterior : numbers + component; };
     bool any_few = false;
     for (std::size_t i = 1; i < list.size(); ++i) {
       const Id id = make(list[i].inside);
-      number[list[i].id] = id;
       sets[id].voxels = list[i].voxels;
       sets[id].first = list[i].first;
       any_few = any_few || list[i].voxels < few;
     }
     std::vector<Id> id;
-    components.each_block([&](const Coord& origin, const LeafLabels* labels, Id offset) {
-      const std::size_t kinds = labels != nullptr ? labels->sets.size() : 1;
-      id.resize(kinds);
-      bool all_outside = true;
-      for (std::size_t k = 0; k < kinds; ++k) {
-        id[k] = number.at(components.find(offset + static_cast<Id>(k)));
-        all_outside = all_outside && id[k] == exterior;
-      }
-      if (all_outside) return;
+    components.each_block([&](const Coord& origin, const LeafLabels* labels, std::span<const Id> of) {
+      id.resize(of.size());
+      std::transform(of.begin(), of.end(), id.begin(), number);
       const auto box = openvdb::CoordBBox::createCube(origin, 8);
       for (const Id i : id) sets[i].box.expand(box);
       if (any_few) remember(origin, labels, id);
@@ -155,14 +150,13 @@ struct PieceSweep::Impl {
       if (origin[axis] == last) next.emplace(across(origin), face(labels, id, !params.falling));
       hold(origin, labels, id, anchor);
     });
-    if (solid != nullptr) regrow(components, list, number, *solid, range, anchor, context);
+    if (solid != nullptr) regrow(components, numbers, *solid, range, anchor, context);
   }
 
   /// Values of a union understate depth, so that a skin cuts off more than it should: what is not held is grown by the
   /// samples around it that are deep all the same, until it meets what is.
-  void regrow(const Components& components, const std::vector<Components::Component>& list,
-              const std::map<Id, Id>& number, const Solid& solid, const SampleRange& range, const Shape& anchor,
-              const Context& context) {
+  void regrow(const Components& components, Id numbers, const Solid& solid, const SampleRange& range,
+              const Shape& anchor, const Context& context) {
     constexpr std::int64_t most = 1 << 20;  // larger ones are met by those around them
     struct Open {
       Id set;
@@ -170,9 +164,10 @@ struct PieceSweep::Impl {
       std::vector<Id> met{};
       bool anchored = false;
     };
+    const auto number = [&](Id component) { return component == exterior ? exterior : numbers + component; };
     std::vector<Open> all;
-    for (const Components::Component& one : list) {
-      const Id id = number.at(one.id);
+    for (const Components::Component& one : components.list()) {
+      const Id id = number(one.id);
       if (one.inside && !sets[id].held && one.voxels <= most) all.push_back({id, one.first});
     }
     tbb::enumerable_thread_specific<Depth> depths([&] { return Depth(solid, params.skin_mm, &range); });
@@ -189,7 +184,7 @@ struct PieceSweep::Impl {
           if (!range.holds({to.x(), to.y(), to.z()}) || seen.isValueOn(to)) continue;
           seen.setValueOn(to);
           if (!depth.deep(to)) continue;
-          const Id other = number.at(components.at(to));
+          const Id other = number(components.at(to));
           if (other == mine.set || !sets[other].inside) {
             samples.push_back(to);
             continue;

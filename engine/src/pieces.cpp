@@ -71,7 +71,7 @@ struct VoidMap::Impl {
   Impl(const Solid& solid, const Context& context) : components(solid, context) {
     if (components.empty()) return;
     std::vector<Components::Component> voids;
-    const auto list = components.list();
+    const auto& list = components.list();
     std::copy_if(list.begin() + 1, list.end(), std::back_inserter(voids), [](const auto& c) { return !c.inside; });
     std::stable_sort(voids.begin(), voids.end(), [](const auto& a, const auto& b) { return a.voxels > b.voxels; });
     for (const Components::Component& c : voids) number.emplace_back(c.id, static_cast<int>(number.size()) + 1);
@@ -113,7 +113,7 @@ std::vector<Gap> gaps(const Solid& solid, double reach_mm, const Context& contex
   const Components components(solid, context);
   std::vector<Gap> result;
   if (components.empty()) return result;
-  const auto list = components.list();
+  const auto& list = components.list();
   const Id keep = main_piece(list);
   for (const auto& piece : list) {
     context.check();

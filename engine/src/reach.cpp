@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 
 #include "components.h"
 #include "depth.h"
@@ -20,36 +21,13 @@ using openvdb::Coord;
 using Leaf = Components::Leaf;
 using Id = Components::Id;
 
-/// Of the components inside, which hold a sample where the anchor is negative. Sorted by id.
-struct Anchored {
-  std::vector<Id> ids;
-  std::vector<bool> reached;
-
-  [[nodiscard]] std::size_t slot(Id id) const {  // ids.size(): none of them
-    const auto at = std::lower_bound(ids.begin(), ids.end(), id);
-    return at != ids.end() && *at == id ? static_cast<std::size_t>(at - ids.begin()) : ids.size();
-  }
-};
-
-Anchored find_anchored(const Components& components, const std::vector<Components::Component>& list,
-                       const Shape& anchor, double voxel_mm) {
-  Anchored found;
-  for (const auto& c : list)
-    if (c.inside) found.ids.push_back(c.id);
-  std::sort(found.ids.begin(), found.ids.end());
-  found.reached.assign(found.ids.size(), false);
-  const std::size_t none = found.ids.size();
-  std::vector<std::size_t> open;
-  components.each_block([&](const Coord& origin, const LeafLabels* labels, Id offset) {
+/// Of each component, whether it is inside and holds a sample where the anchor is negative.
+std::vector<bool> find_anchored(const Components& components, const Shape& anchor, double voxel_mm) {
+  const auto& list = components.list();
+  std::vector<bool> anchored(list.size(), false);
+  components.each_block([&](const Coord& origin, const LeafLabels* labels, std::span<const Id> of) {
     // Most blocks hold nothing but what is known to be reached: no need to ask for the anchor there.
-    const std::size_t kinds = labels != nullptr ? labels->sets.size() : 1;
-    open.assign(kinds, none);
-    bool any = false;
-    for (std::size_t k = 0; k < kinds; ++k) {
-      open[k] = found.slot(components.find(offset + static_cast<Id>(k)));
-      any = any || (open[k] < none && !found.reached[open[k]]);
-    }
-    if (!any) return;
+    if (std::none_of(of.begin(), of.end(), [&](Id c) { return list[c].inside && !anchored[c]; })) return;
     std::array<float, Leaf::SIZE> x, y, z, value;
     for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
       const Vec3f p = to_float(world_mm(origin + Leaf::offsetToLocalCoord(i), voxel_mm));
@@ -58,18 +36,18 @@ Anchored find_anchored(const Components& components, const std::vector<Component
     const Vec3i leaf{origin.x(), origin.y(), origin.z()};
     anchor.evaluate({x.data(), y.data(), z.data(), Leaf::SIZE, &leaf, voxel_mm}, value.data());
     for (std::size_t i = 0; i < Leaf::SIZE; ++i) {
-      const std::size_t slot = open[labels != nullptr ? labels->at(i) : 0];
-      if (slot < none && value[i] < 0) found.reached[slot] = true;
+      const Id mine = of[labels != nullptr ? labels->at(i) : 0];
+      if (list[mine].inside && value[i] < 0) anchored[mine] = true;
     }
   });
-  return found;
+  return anchored;
 }
 
 /// Components that the values leave unreached, each grown by the samples around it that are deep all the same. Those
 /// that meet are one; those that meet what is reached, or the anchor, are reached. Set 0 is what is reached.
 class Regrown {
  public:
-  Regrown(const Components& components, const Anchored& anchored, Depth& depth)
+  Regrown(const Components& components, const std::vector<bool>& anchored, Depth& depth)
       : components_(components), anchored_(anchored), depth_(depth), sets_(1) {}
 
   void grow(const std::vector<Components::Component>& unreached, const Shape& anchor, double voxel_mm,
@@ -89,8 +67,7 @@ class Regrown {
   /// The set that a sample belongs to: 0 is reached, -1 is none.
   [[nodiscard]] std::int64_t at(const Coord& at) {
     if (const std::int32_t mine = owner_.getValue(at); mine > 0) return sets_.root(static_cast<std::uint32_t>(mine));
-    const std::size_t slot = anchored_.slot(components_.at(at));
-    return slot < anchored_.ids.size() && anchored_.reached[slot] ? 0 : -1;
+    return anchored_[components_.at(at)] ? 0 : -1;
   }
   void reach(std::uint32_t set) { sets_.join(0, set); }
 
@@ -111,8 +88,7 @@ class Regrown {
           continue;
         }
         if (!depth_.deep(to)) continue;
-        if (const std::size_t slot = anchored_.slot(components_.at(to));
-            slot < anchored_.ids.size() && anchored_.reached[slot]) {
+        if (anchored_[components_.at(to)]) {
           sets_.join(0, mine);
           continue;
         }
@@ -123,7 +99,7 @@ class Regrown {
   }
 
   const Components& components_;
-  const Anchored& anchored_;
+  const std::vector<bool>& anchored_;
   Depth& depth_;
   DisjointSets sets_;
   std::vector<std::vector<Coord>> samples_;
@@ -159,8 +135,8 @@ std::vector<Unreached> unreached(const Solid& solid, const Shape& anchor, const 
   const Components components(solid, context, -static_cast<float>(depth_mm));
   if (components.empty()) return {};
   auto list = components.list();
-  const Anchored anchored = find_anchored(components, list, anchor, voxel);
-  std::erase_if(list, [&](const auto& c) { return !c.inside || anchored.reached[anchored.slot(c.id)]; });
+  const std::vector<bool> anchored = find_anchored(components, anchor, voxel);
+  std::erase_if(list, [&](const auto& c) { return !c.inside || anchored[c.id]; });
   if (list.empty()) return {};
 
   std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a.voxels > b.voxels; });

@@ -18,6 +18,8 @@
 #include "fibrolite/clones.h"
 #include "fibrolite/error.h"
 #include "fibrolite/vdb.h"
+#include "inner_tiles.h"
+#include "leaf_bits.h"
 #include "vdb_access.h"
 
 namespace fibrolite {
@@ -25,6 +27,7 @@ namespace {
 
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
+using Access = openvdb::tree::ValueAccessor<const Tree, false>;  // unknown to the tree, which is not changed
 
 Vec3d sample_mm(const openvdb::Coord& ijk, double voxel) {
   return voxel * Vec3d{1.0 * ijk.x(), 1.0 * ijk.y(), 1.0 * ijk.z()};
@@ -88,75 +91,68 @@ struct SolidDistance final : Shape::Function {
   Solid solid;
 };
 
-/// A leaf's samples with those next to its faces.
-struct Padded {
-  static constexpr std::array<int, 3> stride{100, 10, 1};
-  static constexpr int first = 111;  // sample (0, 0, 0)
-  std::array<float, 1000> value;     // from (-1, -1, -1) to (8, 8, 8); the corners and edges are never read
+/// A leaf's samples and where those next to its faces are: in other leaves, or one value that stands for all.
+struct Surrounded {
+  static constexpr std::array<int, 3> along{64, 8, 1};
+  struct Beside {
+    const float* first;  ///< The neighbour of sample (0, 0, 0), or of (7, 0, 0), (0, 7, 0), (0, 0, 7).
+    std::array<int, 3> step;
+  };
+  const float* value;
+  std::array<Beside, 3> before, after;
+  std::array<std::array<float, 8>, 6> tile;
 
-  void fetch(const Leaf& leaf, openvdb::tree::ValueAccessor<const Tree>& access) {
-    const float* v = leaf.buffer().data();
-    for (int x = 0; x < 8; ++x)
-      for (int y = 0; y < 8; ++y)
-        std::copy_n(v + 64 * x + 8 * y, 8, value.data() + first + stride[0] * x + stride[1] * y);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      for (const bool upper : {false, true}) fetch_face(leaf, axis, upper, access);
+  Surrounded(const Leaf& leaf, Access& access) : value(leaf.buffer().data()) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      before[axis] = beside(leaf, axis, false, access);
+      after[axis] = beside(leaf, axis, true, access);
+    }
   }
+  Surrounded(const Surrounded&) = delete;  // points into itself
+  Surrounded& operator=(const Surrounded&) = delete;
 
  private:
-  void fetch_face(const Leaf& leaf, std::size_t axis, bool upper, openvdb::tree::ValueAccessor<const Tree>& access) {
+  Beside beside(const Leaf& leaf, std::size_t axis, bool upper, Access& access) {
     openvdb::Coord place = leaf.origin();
     place[axis] += upper ? 8 : -8;
-    const Leaf* next = access.probeConstLeaf(place);
-    std::array<float, 8> tile;
-    if (next == nullptr) tile.fill(access.getValue(place));
-    float* const to = value.data() + first + (upper ? 8 : -1) * stride[axis];
-    if (axis == 2) {
-      const float* const from = next != nullptr ? next->buffer().data() + (upper ? 0 : 7) : tile.data();
-      const int step = next != nullptr ? 8 : 0;
-      for (int x = 0; x < 8; ++x)
-        for (int y = 0; y < 8; ++y) to[stride[0] * x + stride[1] * y] = from[step * (8 * x + y)];
-      return;
-    }
-    // Rows along z.
-    const int other = axis == 0 ? 1 : 0, in_leaf = axis == 0 ? 8 : 64;
-    const float* const from =
-        next != nullptr ? next->buffer().data() + (upper ? 0 : 7 * (axis == 0 ? 64 : 8)) : tile.data();
-    const int step = next != nullptr ? in_leaf : 0;
-    for (int i = 0; i < 8; ++i) std::copy_n(from + step * i, 8, to + stride[static_cast<std::size_t>(other)] * i);
+    if (const Leaf* next = access.probeConstLeaf(place))
+      return {next->buffer().data() + (upper ? 0 : 7 * along[axis]), along};
+    std::array<float, 8>& all = tile[2 * axis + (upper ? 1 : 0)];
+    all.fill(access.getValue(place));
+    return {all.data(), {0, 0, 0}};
   }
 };
 
-/// A leaf's samples lie anywhere in memory: asked for some leaves ahead, they are there in time.
-constexpr std::size_t ahead = 4;
-void prefetch(const Leaf& leaf) {
-  const float* v = leaf.buffer().data();
-  for (int i = 0; i < 512; i += 16) __builtin_prefetch(v + i);
-}
+/// Farther from the surface than this, voxels, a distance is its own mean.
+constexpr float near_vox = 1.5F;
 
 /// Filled part of a leaf, voxels. A sample counts with clamp(1/2 - m, 0, 1), m the mean distance over its voxel: the
 /// distance at the sample plus 1/24 of the Laplacian, which takes the error of curved surfaces from second to fourth
 /// order.
-FIBROLITE_CLONES double filled(const Padded& p, float inverse) {
+FIBROLITE_CLONES double filled(const Surrounded& at, float inverse) {
   // A row side by side: written as vectors, as the compiler makes branches of the comparisons.
   using Lanes [[gnu::vector_size(32)]] = float;
-  constexpr int dx = Padded::stride[0], dy = Padded::stride[1];
+  using Places [[gnu::vector_size(32)]] = std::int32_t;
+  constexpr Places one_up{7, 0, 1, 2, 3, 4, 5, 6}, one_down{1, 2, 3, 4, 5, 6, 7, 0};
+  const auto& [back_x, back_y, back_z] = at.before;
+  const auto& [on_x, on_y, on_z] = at.after;
   Lanes sum{};
   for (int x = 0; x < 8; ++x) {
     for (int y = 0; y < 8; ++y) {
-      const float* v = p.value.data() + Padded::first + dx * x + dy * y;
-      Lanes here, back, forth, left, right, down, up;
+      const float* v = at.value + 64 * x + 8 * y;
+      Lanes here, back, forth, left, right;
       std::memcpy(&here, v, sizeof here);
-      std::memcpy(&forth, v + dx, sizeof forth);
-      std::memcpy(&back, v - dx, sizeof back);
-      std::memcpy(&right, v + dy, sizeof right);
-      std::memcpy(&left, v - dy, sizeof left);
-      std::memcpy(&up, v + 1, sizeof up);
-      std::memcpy(&down, v - 1, sizeof down);
+      std::memcpy(&forth, x < 7 ? v + 64 : on_x.first + on_x.step[1] * y, sizeof forth);
+      std::memcpy(&back, x > 0 ? v - 64 : back_x.first + back_x.step[1] * y, sizeof back);
+      std::memcpy(&right, y < 7 ? v + 8 : on_y.first + on_y.step[0] * x, sizeof right);
+      std::memcpy(&left, y > 0 ? v - 8 : back_y.first + back_y.step[0] * x, sizeof left);
+      Lanes up = __builtin_shuffle(here, one_down), down = __builtin_shuffle(here, one_up);
+      up[7] = on_z.first[on_z.step[0] * x + on_z.step[1] * y];
+      down[0] = back_z.first[back_z.step[0] * x + back_z.step[1] * y];
       const Lanes d = here * inverse, size = d < 0 ? -d : d;
       const Lanes around = forth + back + right + left + up + down;
       const Lanes mean = d + (around * inverse - 6 * d) * (1.0F / 24.0F);
-      const Lanes part = 0.5F - (size < 1.5F ? mean : d), most = part < 1 ? part : Lanes{} + 1.0F;
+      const Lanes part = 0.5F - (size < near_vox ? mean : d), most = part < 1 ? part : Lanes{} + 1.0F;
       sum += most > 0 ? most : Lanes{};
     }
   }
@@ -165,38 +161,31 @@ FIBROLITE_CLONES double filled(const Padded& p, float inverse) {
   return rounded_for_sums(all);
 }
 
-bool holds(const SampleRange& range, const openvdb::Coord& at) { return range.holds({at.x(), at.y(), at.z()}); }
+/// In voxels. Rounded: blocks add up to the same bits in any order.
+double filled_voxels(const Leaf& leaf, Access& access, float inverse) {
+  // Where no sample is near the surface, each voxel is full or empty as the sample itself says.
+  const Interval range_mm = range_of(leaf.buffer().data(), Leaf::SIZE);
+  if (range_mm.hi * inverse <= -near_vox) return Leaf::SIZE;
+  if (range_mm.lo * inverse >= near_vox) return 0;
+  return filled(Surrounded(leaf, access), inverse);
+}
 
-/// In voxels; of a range or all. Rounded for each leaf: the same bits on any number of threads, and in any parts.
-double filled_voxels(const Tree& tree, double voxel_mm, const SampleRange* range) {
-  const openvdb::tree::LeafManager<const Tree> leaves(tree);
-  std::vector<double> part(leaves.leafCount(), 0.0);
+double filled_voxels(const Tree& tree, double voxel_mm) {
+  std::vector<const Leaf*> leaves;
+  leaves.reserve(tree.leafCount());
+  tree.getNodes(leaves);
+  std::vector<double> part(leaves.size(), 0.0);
   const auto inverse = static_cast<float>(1.0 / voxel_mm);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, part.size(), 64), [&](const auto& some) {
-    openvdb::tree::ValueAccessor<const Tree> access(tree);
-    Padded padded;
+    Access access(tree);
     for (std::size_t i = some.begin(); i < some.end(); ++i) {
-      if (range != nullptr && !holds(*range, leaves.leaf(i).origin())) continue;
-      if (i + ahead < some.end()) prefetch(leaves.leaf(i + ahead));
-      padded.fetch(leaves.leaf(i), access);
-      part[i] = filled(padded, inverse);
+      fetch_ahead(leaves, i);
+      part[i] = filled_voxels(*leaves[i], access, inverse);
     }
   });
   double voxels = 0;
   for (const double v : part) voxels += v;
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile >= 0) continue;
-    openvdb::CoordBBox box = tile.getBoundingBox();
-    if (range != nullptr) {
-      const auto axis = static_cast<std::size_t>(range->axis);
-      box.min()[axis] = std::max(box.min()[axis], range->low);
-      box.max()[axis] = std::min(box.max()[axis], range->high - 1);
-      if (box.empty()) continue;
-    }
-    voxels += static_cast<double>(box.volume());
-  }
+  for (const openvdb::CoordBBox& tile : inner_tiles(tree)) voxels += static_cast<double>(tile.volume());
   return voxels;
 }
 
@@ -219,7 +208,7 @@ openvdb::FloatGrid::Ptr make_grid(Grid spec) {
 }
 
 Solid make_solid(openvdb::FloatGrid::ConstPtr grid, Grid spec) {
-  return Solid(std::make_shared<const Solid::Impl>(Solid::Impl{std::move(grid), spec}));
+  return Solid(std::make_shared<const Solid::Impl>(std::move(grid), spec));
 }
 
 openvdb::FloatGrid::Ptr editable(Solid&& solid) {
@@ -247,11 +236,7 @@ Box3d Solid::bounds_mm() const {
       if (leaf->getValue(i) < 0) box.include(sample_mm(leaf->offsetToGlobalCoord(i), h));
     }
   }
-  auto tile = tree.cbeginValueAll();
-  tile.setMaxDepth(Tree::ValueAllCIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    if (*tile >= 0) continue;
-    const openvdb::CoordBBox b = tile.getBoundingBox();
+  for (const openvdb::CoordBBox& b : inner_tiles(tree)) {
     box.include(sample_mm(b.min(), h));
     box.include(sample_mm(b.max(), h));
   }
@@ -260,17 +245,27 @@ Box3d Solid::bounds_mm() const {
 
 double Solid::volume_mm3() const {
   const double h = impl_->spec.voxel_mm;
-  return filled_voxels(impl_->grid->tree(), h, nullptr) * h * h * h;
+  double voxels = impl_->filled_voxels.load();
+  if (voxels < 0) {
+    voxels = fibrolite::filled_voxels(impl_->grid->tree(), h);
+    impl_->filled_voxels.store(voxels);
+  }
+  return voxels * h * h * h;
 }
 
-double Solid::volume_vox(const SampleRange& range) const {
-  return filled_voxels(impl_->grid->tree(), impl_->spec.voxel_mm, &range);
+double Solid::filled_vox(Vec3i block) const {
+  const openvdb::Coord origin(block.x, block.y, block.z);
+  Access access(impl_->grid->tree());
+  const Leaf* leaf = access.probeConstLeaf(origin);
+  if (leaf == nullptr) return access.getValue(origin) < 0 ? Leaf::SIZE : 0;
+  return filled_voxels(*leaf, access, static_cast<float>(1.0 / impl_->spec.voxel_mm));
 }
 
 std::int64_t Solid::active_voxels(const SampleRange& range) const {
   std::int64_t count = 0;
   for (auto leaf = impl_->grid->tree().cbeginLeaf(); leaf; ++leaf)
-    if (holds(range, leaf->origin())) count += static_cast<std::int64_t>(leaf->onVoxelCount());
+    if (const openvdb::Coord o = leaf->origin(); range.holds({o.x(), o.y(), o.z()}))
+      count += static_cast<std::int64_t>(leaf->onVoxelCount());
   return count;
 }
 

@@ -118,7 +118,7 @@ class TriangleBand::Builder {
         Band band{.tree = empty_tree()};
         put(fill(cells_in(box), box, context.part(0.9 * row / rows, 0.9 * (row + 1) / rows, "")), box, band);
         total.overlap = total.overlap || band.overlap;
-        const std::vector<std::size_t> found = contradicted(band, box);
+        const std::vector<std::size_t> found = unsettled(contradictions(*band.tree, params_.voxel_mm, box));
         again.insert(again.end(), found.begin(), found.end());
       }
       for (const std::size_t i : again) settled_[i] = true;
@@ -240,10 +240,10 @@ class TriangleBand::Builder {
     }
   }
 
-  /// Cells with sides that contradict each other or their neighbours', not yet settled by winding number; sorted.
-  [[nodiscard]] std::vector<std::size_t> contradicted(const Band& band, const CoordBBox& box) const {
+  /// Cells of blocks with sides that contradict each other, not yet settled by winding number; sorted.
+  [[nodiscard]] std::vector<std::size_t> unsettled(const std::vector<Coord>& blocks) const {
     std::vector<std::size_t> found;
-    for (const Coord& block : contradictions(*band.tree, params_.voxel_mm, box)) {
+    for (const Coord& block : blocks) {
       auto cell = place_.find(block & ~(cell_size - 1));
       if (cell == place_.end()) cell = place_.find(block & ~(2 * cell_size - 1));
       if (cell != place_.end() && !settled_[cell->second]) found.push_back(cell->second);
@@ -256,15 +256,17 @@ class TriangleBand::Builder {
   /// Where a surface meets itself, the closest feature may tell the wrong side. Sides that contradict each other show
   /// it: their cells are filled again by winding number, and so on while that contradicts their neighbours.
   void settle(Band& band, const Context& context) {
-    while (!band.overlap) {
+    std::vector<std::size_t> again;
+    if (!band.overlap) again = unsettled(contradictions(*band.tree, params_.voxel_mm));
+    while (!again.empty() && !band.overlap) {
       context.check();
-      const std::vector<std::size_t> again = contradicted(band, everywhere());
-      if (again.empty()) return;
       band.cells_by_winding += static_cast<std::int64_t>(again.size());
       openvdb::tree::ValueAccessor<Tree> accessor(*band.tree);
+      std::vector<CoordBBox> changed;
       for (const std::size_t i : again) {
         settled_[i] = true;
         const TriangleCells::Cell& cell = cells_.cells[i];
+        changed.push_back(cube(cell.origin, cell.size));
         for (int x = 0; x < cell.size; x += 8) {
           for (int y = 0; y < cell.size; y += 8) {
             for (int z = 0; z < cell.size; z += 8) {
@@ -274,6 +276,7 @@ class TriangleBand::Builder {
         }
       }
       put(fill(again, everywhere(), context.part(0.9, 1, "")), everywhere(), band);
+      again = unsettled(contradictions_around(changed, *band.tree, params_.voxel_mm));
     }
   }
 

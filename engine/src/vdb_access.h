@@ -4,7 +4,9 @@
 
 #include <openvdb/openvdb.h>
 
+#include <atomic>
 #include <memory>
+#include <utility>
 
 #include "fibrolite/solid.h"
 
@@ -13,8 +15,11 @@ namespace fibrolite {
 /// The tree's background is +band (outside); voxels and tiles inside are negative. Index (i, j, k) lies at voxel_mm *
 /// (i, j, k).
 struct Solid::Impl {
-  openvdb::FloatGrid::ConstPtr grid;
-  Grid spec;
+  Impl(openvdb::FloatGrid::ConstPtr g, Grid s) : grid(std::move(g)), spec(s) {}
+
+  const openvdb::FloatGrid::ConstPtr grid;
+  const Grid spec;
+  mutable std::atomic<double> filled_voxels{-1};  ///< Once they have been asked for; it takes a look at all of them.
 };
 
 /// Registers OpenVDB's types, once per process, thread-safe.

@@ -106,9 +106,7 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   const TieParams ties = tie_params(recipe, params.infill, out.body, voxel);
   const Tied tied = run("one piece", 0.95, [&](const Context& c) {
     Tied made = tie(params.steps ? raw : std::exchange(raw, {}), whole, body, ties, c);
-    made = trim(std::move(made), whole, body, sticks, shell_mm, ties, c);
-    made.solid = narrowed(std::move(made.solid));
-    return made;
+    return trim(std::move(made), whole, body, sticks, shell_mm, ties, c);
   });
   const Mended mended = run("print checks", 0.97, [&](const Context& c) {
     return checked_and_mended(tied, body, out.parts, fills, sticks, ties, recipe, params.fix, report, c);
@@ -118,9 +116,12 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
   run("measure", 1.0, [&](const Context& c) {
     std::vector<Shape> regions;
     for (const Part& part : out.parts.parts) regions.push_back(part.region());
-    report_parts(out.parts, fills, measure(body, out.solid, regions, shell_mm, c), params.infill, report);
+    const Volumes volumes = measure(body, out.solid, regions, shell_mm, c);
+    report_parts(out.parts, fills, volumes.parts, params.infill, report);
     report_joints(out.interfaces, out.joints, demand_n, recipe, report);
-    report_solid(mended.tied, fills, body, recipe.material, report);
+    report.solid.active_voxels = out.solid.active_voxels();
+    report.solid.voxel_mm = voxel;
+    report_solid(mended.tied, fills, volumes, recipe.material, report);
   });
   if (params.function) {
     const Shape smooth =

@@ -17,9 +17,9 @@ std::string name_of(const SampleRange& slab) {
 /// Every field, in one order for writing and reading.
 template <class Sums, class Field, class List>
 void each(Sums& sums, const Field& field, const List& list) {
-  list(sums.parts);
-  field(sums.body_vox);
-  field(sums.solid_vox);
+  list(sums.volumes.parts);
+  field(sums.volumes.body_vox);
+  field(sums.volumes.solid_vox);
   field(sums.active_voxels);
   field(sums.print.lumen_mm2);
   auto count = static_cast<std::uint64_t>(sums.print.runs.size());
@@ -54,10 +54,7 @@ void each(Tie& tied, Flip& flips, const Field& field, const List& list) {
 }  // namespace
 
 void SlabSums::add(const SlabSums& other, const PatchRules& rules) {
-  parts.resize(other.parts.size());
-  for (std::size_t i = 0; i < parts.size(); ++i) parts[i] += other.parts[i];
-  body_vox += other.body_vox;
-  solid_vox += other.solid_vox;
+  volumes += other.volumes;
   active_voxels += other.active_voxels;
   print.add(other.print, rules);
 }

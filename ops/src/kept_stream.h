@@ -15,8 +15,7 @@ namespace fibrolite {
 
 /// What is measured of a slab; slabs add up to the whole's without an error.
 struct SlabSums {
-  std::vector<PartSums> parts;
-  double body_vox = 0, solid_vox = 0;
+  VolumeSums volumes;
   std::int64_t active_voxels = 0;
   PrintTally print;
   void add(const SlabSums& other, const PatchRules& rules);

@@ -141,8 +141,8 @@ void add_parts(const Values& body, const Values& solid, const std::vector<Values
   }
 }
 
-std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& body, const Solid& solid,
-                                const std::vector<Shape>& regions, double shell_mm, const Context& context) {
+VolumeSums sums_over(const std::vector<Vec3i>& origins, const Solid& body, const Solid& solid,
+                     const std::vector<Shape>& regions, double shell_mm, const Context& context) {
   const double h = body.grid().voxel_mm;
   const auto inverse = static_cast<float>(1 / h), shell = static_cast<float>(shell_mm);
   const Shape body_shape = distance_to(body), solid_shape = distance_to(solid);
@@ -150,8 +150,12 @@ std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& 
 
   // Each block is rounded, so that blocks add up to the same bits in any order.
   constexpr std::size_t batch_size = 16384;
-  std::vector<PartSums> total(n);
+  VolumeSums total{.parts = std::vector<PartSums>(n)};
   std::vector<PartSums> sums(std::min(origins.size(), batch_size) * n);
+  struct Filled {
+    double body, solid;
+  };
+  std::vector<Filled> filled(std::min(origins.size(), batch_size));
   for (std::size_t start = 0; start < origins.size(); start += batch_size) {
     context.check();
     const std::vector<Vec3i> batch(
@@ -173,9 +177,12 @@ std::vector<PartSums> sums_over(const std::vector<Vec3i>& origins, const Solid& 
         add_parts(b, s, shares, block, inverse, shell, into);
       }
       for (std::size_t r = 0; r < n; ++r) into[r] = rounded(into[r]);
+      filled[number] = {body.filled_vox(*block.leaf), solid.filled_vox(*block.leaf)};
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      for (std::size_t r = 0; r < n; ++r) total[r] += sums[i * n + r];
+      total.body_vox += filled[i].body;
+      total.solid_vox += filled[i].solid;
+      for (std::size_t r = 0; r < n; ++r) total.parts[r] += sums[i * n + r];
     }
   }
   return total;
@@ -196,17 +203,29 @@ PartVolumes PartSums::volumes(double voxel_mm) const {
   return {part * voxel_mm3, lumen * voxel_mm3, infill * voxel_mm3, part > 0 ? moment_mm / part : Vec3d{}};
 }
 
-std::vector<PartSums> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions, double shell_mm,
-                              const SampleRange& range, const Context& context) {
+VolumeSums& VolumeSums::operator+=(const VolumeSums& other) {
+  body_vox += other.body_vox;
+  solid_vox += other.solid_vox;
+  parts.resize(std::max(parts.size(), other.parts.size()));
+  for (std::size_t i = 0; i < other.parts.size(); ++i) parts[i] += other.parts[i];
+  return *this;
+}
+
+Volumes volumes(const VolumeSums& sums, double voxel_mm) {
+  const double h = voxel_mm;
+  Volumes result{sums.body_vox * h * h * h, sums.solid_vox * h * h * h, {}};
+  for (const PartSums& part : sums.parts) result.parts.push_back(part.volumes(voxel_mm));
+  return result;
+}
+
+VolumeSums measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions, double shell_mm,
+                   const SampleRange& range, const Context& context) {
   return sums_over(blocks(body, range), body, solid, regions, shell_mm, context);
 }
 
-std::vector<PartVolumes> measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions,
-                                 double shell_mm, const Context& context) {
-  std::vector<PartVolumes> result;
-  for (const PartSums& sums : sums_over(blocks(body), body, solid, regions, shell_mm, context))
-    result.push_back(sums.volumes(body.grid().voxel_mm));
-  return result;
+Volumes measure(const Solid& body, const Solid& solid, const std::vector<Shape>& regions, double shell_mm,
+                const Context& context) {
+  return volumes(sums_over(blocks(body), body, solid, regions, shell_mm, context), body.grid().voxel_mm);
 }
 
 }  // namespace fibrolite

@@ -243,7 +243,6 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& part
     rest = trim(std::move(rest), distance_to(solid), body, sticks, shell_mm, around, context);
     out.tied.dangling = 0;  // counted again
     out.tied = and_then(out.tied, std::move(rest));
-    out.tied.solid = narrowed(std::move(out.tied.solid));
   }
   const Shape lumen = printed_lumen(distance_to(body), shell_mm);
   report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm(fills, limits), context);

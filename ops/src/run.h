@@ -116,10 +116,8 @@ void report_joints(const std::vector<Interface>& interfaces, const std::vector<J
 void report_coarse(const Box3d& model, double voxel_mm, Report& report);
 /// Down to which thickness necks are looked for, and a warning if that is thinner than a wall may be.
 void report_necks(double thinnest_mm, Grid grid, const PrintParams& limits, Report& report);
-void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,
+/// All but the samples' number and size.
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Volumes& volumes, const Material& material,
                   Report& report);
-/// Of a solid that is not held: all but its samples' number and size.
-void report_solid(const Tied& tied, const std::vector<Fill>& fills, double body_mm3, double solid_mm3,
-                  const Material& material, Report& report);
 
 }  // namespace fibrolite

@@ -130,18 +130,11 @@ void report_necks(double thinnest_mm, Grid grid, const PrintParams& limits, Repo
                             remedy);
 }
 
-void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Solid& body, const Material& material,
+void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Volumes& volumes, const Material& material,
                   Report& report) {
-  report.solid.active_voxels = tied.solid.active_voxels();
-  report.solid.voxel_mm = body.grid().voxel_mm;
-  report_solid(tied, fills, body.volume_mm3(), tied.solid.volume_mm3(), material, report);
-}
-
-void report_solid(const Tied& tied, const std::vector<Fill>& fills, double body_mm3, double solid_mm3,
-                  const Material& material, Report& report) {
   SolidReport& out = report.solid;
-  out.volume_mm3 = solid_mm3;
-  out.fill_ratio = body_mm3 > 0 ? out.volume_mm3 / body_mm3 : 0;
+  out.volume_mm3 = volumes.solid_mm3;
+  out.fill_ratio = volumes.body_mm3 > 0 ? out.volume_mm3 / volumes.body_mm3 : 0;
   out.mass_g = out.volume_mm3 * 1e-3 * material.density_g_cm3;
   out.pieces = static_cast<std::int64_t>(tied.left.material.size());
   out.cavities = static_cast<std::int64_t>(tied.left.cavities.size());
@@ -155,7 +148,7 @@ void report_solid(const Tied& tied, const std::vector<Fill>& fills, double body_
   out.unreached = static_cast<std::int64_t>(tied.unreached.size());
   out.specks_removed = tied.dropped;
   out.voids_filled = tied.filled;
-  report.model.volume_mm3 = body_mm3;
+  report.model.volume_mm3 = volumes.body_mm3;
   if (out.pieces > 1) {
     report.warnings.push_back("the solid has " + std::to_string(out.pieces) +
                               " pieces: the model itself has pieces too far apart to tie");

@@ -38,7 +38,7 @@ struct SolidStream::Impl {
     sticks = sticks_of(design.parts, design.fills);
     const PrintParams& limits = design.recipe.print;
     print_rules = patch_rules(limits, design.recipe.verify.up, node_mm(design.fills, limits), grid.voxel_mm);
-    sums.parts.resize(regions.size());
+    sums.volumes.parts.resize(regions.size());
     measured.resize(plan.borders.size() - 1, false);
   }
 
@@ -228,7 +228,7 @@ struct SolidStream::Impl {
   Slab slab(std::size_t number, const Context& context) {
     Slab result{range(number), number, body(number, plan.margin_vox, quiet(context)), {}};
     context.check();
-    result.solid = narrowed(flipped(raw(result.body, quiet(context)), found.flips));
+    result.solid = flipped(raw(result.body, quiet(context)), found.flips);
     context.check();
     if (!measured[number]) measure(number, result, context);
     return result;
@@ -265,9 +265,7 @@ struct SolidStream::Impl {
   void measure(std::size_t number, const Slab& slab, const Context& context) {
     const double shell_mm = design.assembly.shell_mm;
     SlabSums here;
-    here.parts = fibrolite::measure(slab.body, slab.solid, regions, shell_mm, slab.range, quiet(context));
-    here.body_vox = slab.body.volume_vox(slab.range);
-    here.solid_vox = slab.solid.volume_vox(slab.range);
+    here.volumes = fibrolite::measure(slab.body, slab.solid, regions, shell_mm, slab.range, quiet(context));
     here.active_voxels = slab.solid.active_voxels(slab.range);
     if (design.recipe.print.check) {
       const Shape lumen = printed_lumen(distance_to(slab.body), shell_mm);
@@ -281,15 +279,12 @@ struct SolidStream::Impl {
   void finish(Report& report, const Context& context) {
     for (std::size_t i = 0; i < measured.size(); ++i)
       if (!measured[i]) static_cast<void>(slab(i, context));
-    std::vector<PartVolumes> volumes;
-    for (const PartSums& part : sums.parts) volumes.push_back(part.volumes(grid.voxel_mm));
-    report_parts(design.parts, design.fills, volumes, design.infill, report);
+    const Volumes measured_all = volumes(sums.volumes, grid.voxel_mm);
+    report_parts(design.parts, design.fills, measured_all.parts, design.infill, report);
     report_joints(design.interfaces, design.joints, design.demand_n, design.recipe, report);
-    const double h = grid.voxel_mm;
     report.solid.active_voxels = sums.active_voxels;
-    report.solid.voxel_mm = h;
-    report_solid(made.tied, design.fills, sums.body_vox * h * h * h, sums.solid_vox * h * h * h, design.recipe.material,
-                 report);
+    report.solid.voxel_mm = grid.voxel_mm;
+    report_solid(made.tied, design.fills, measured_all, design.recipe.material, report);
     if (design.recipe.print.check) {
       report.print.found = sums.print.total(print_rules);
       report.print.checked = true;
