@@ -19,6 +19,7 @@
 
 #include "band_check.h"
 #include "fibrolite/clones.h"
+#include "inner_tiles.h"
 #include "leaf_bits.h"
 #include "triangle_cells.h"
 #include "triangle_kernel.h"
@@ -106,23 +107,44 @@ class TriangleBand::Builder {
 
   Band survey(const Context& context) {
     Band total;
+    std::vector<std::size_t> again;
+    const auto look = [&](Band& band, const CoordBBox& box, const CoordBBox& known, const Context& here) {
+      put(fill(cells_in(box), box, here), box, band);
+      total.overlap = total.overlap || band.overlap;
+      const std::vector<std::size_t> found = unsettled(contradictions(*band.tree, params_.voxel_mm, known));
+      again.insert(again.end(), found.begin(), found.end());
+    };
     const CoordBBox all = samples();
     const int rows = (all.dim().x() + cell_size - 1) / cell_size;
-    for (bool changed = true; changed && !total.overlap;) {
-      std::vector<std::size_t> again;
-      for (int row = 0; row < rows && !total.overlap; ++row) {
-        // With a block on either side, so that each two neighbours are seen together.
-        CoordBBox box = all;
-        box.min().x() = all.min().x() + row * cell_size - 8;
-        box.max().x() = all.min().x() + (row + 1) * cell_size + 7;
-        Band band{.tree = empty_tree()};
-        put(fill(cells_in(box), box, context.part(0.9 * row / rows, 0.9 * (row + 1) / rows, "")), box, band);
-        total.overlap = total.overlap || band.overlap;
-        const std::vector<std::size_t> found = unsettled(contradictions(*band.tree, params_.voxel_mm, box));
-        again.insert(again.end(), found.begin(), found.end());
+    Tree::Ptr before = empty_tree();
+    for (int row = 0; row < rows && !total.overlap; ++row) {
+      CoordBBox box = all;
+      box.min().x() = all.min().x() + row * cell_size;
+      box.max().x() = box.min().x() + cell_size - 1;
+      Band band{.tree = empty_tree()};
+      move_blocks(*before, box.min().x() - 8, all, *band.tree);
+      CoordBBox known = box;  // the last blocks of the row before too, so that each two neighbours are seen together
+      known.min().x() -= 8;
+      if (row + 1 == rows) known.max().x() += 8;
+      look(band, box, known, context.part(0.8 * row / rows, 0.8 * (row + 1) / rows, ""));
+      before = band.tree;
+    }
+    before.reset();
+    while (!again.empty() && !total.overlap) {
+      std::map<int, CoordBBox> changed;  // by row
+      for (const std::size_t i : again) {
+        settled_[i] = true;
+        const TriangleCells::Cell& cell = cells_.cells[i];
+        changed[cell.origin.x()].expand(cube(cell.origin, cell.size));
       }
-      for (const std::size_t i : again) settled_[i] = true;
-      changed = !again.empty();
+      again.clear();
+      for (auto& [row, box] : changed) {
+        box.expand(8);
+        Band band{.tree = empty_tree()};
+        look(band, box, box, context.part(0.8, 0.9, ""));
+      }
+      std::sort(again.begin(), again.end());
+      again.erase(std::unique(again.begin(), again.end()), again.end());
     }
     total.cells_by_winding = std::count(settled_.begin(), settled_.end(), true);
     return total;
@@ -237,6 +259,25 @@ class TriangleBand::Builder {
       band.inside_samples += cell.inside_samples;
       band.doubtful_samples += cell.doubtful_samples;
       band.overlap = band.overlap || cell.overlap;
+    }
+  }
+
+  /// Blocks of one layer across x.
+  static void move_blocks(Tree& from, int x, const CoordBBox& all, Tree& to) {
+    std::vector<const Leaf*> leaves;
+    from.getNodes(leaves);
+    for (const Leaf* leaf : leaves) {
+      const Coord origin = leaf->origin();
+      if (origin.x() == x) to.addLeaf(from.stealNode<Leaf>(origin, from.background(), false));
+    }
+    CoordBBox layer = all;
+    layer.min().x() = x;
+    layer.max().x() = x + 7;
+    for (CoordBBox tile : inner_tiles(from)) {
+      const float inside = from.getValue(tile.min());
+      tile.intersect(layer);
+      for (int y = tile.min().y(); y <= tile.max().y() && !tile.empty(); y += 8)
+        for (int z = tile.min().z(); z <= tile.max().z(); z += 8) to.addTile(1, Coord(x, y, z), inside, false);
     }
   }
 
