@@ -85,23 +85,21 @@ TriangleFrame make_frame(Vec3d a, Vec3d b, Vec3d c, std::uint32_t triangle) {
 ClosestFeature closest_feature(const TriangleFrame& t, Vec3f p) {
   const auto linear = [&](const float* v) { return v[0] * p.x + v[1] * p.y + v[2] * p.z; };
   const float h = t.h + linear(t.n);
-  float e[3], x[3];
-  bool inside = true;
+  Vec3f offset{h * t.n[0], h * t.n[1], h * t.n[2]};
+  const float e[3] = {t.e[0] + linear(t.out[0]), t.e[1] + linear(t.out[1]), t.e[2] + linear(t.out[2])};
+  if (e[0] < 0 && e[1] < 0 && e[2] < 0) return {ClosestFeature::Face, 0, offset};
+  float x[3];
   int best = 0;
   float best_m = infinity;
   for (int i = 0; i < 3; ++i) {
-    e[i] = t.e[i] + linear(t.out[i]);
     const float a = linear(t.along[i]), before = t.before[i] - a, past = a + t.past[i];
     x[i] = past > 0 ? past : before > 0 ? -before : 0.0F;
-    inside = inside && e[i] < 0;
     const float m = e[i] * e[i] + x[i] * x[i];
     if (m < best_m) {
       best_m = m;
       best = i;
     }
   }
-  Vec3f offset{h * t.n[0], h * t.n[1], h * t.n[2]};
-  if (inside) return {ClosestFeature::Face, 0, offset};
   const float *out = t.out[best], *along = t.along[best];
   offset = {offset.x + e[best] * out[0] + x[best] * along[0], offset.y + e[best] * out[1] + x[best] * along[1],
             offset.z + e[best] * out[2] + x[best] * along[2]};

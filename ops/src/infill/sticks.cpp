@@ -39,6 +39,9 @@ struct Folded {
 };
 
 [[gnu::always_inline]] inline void smaller(Lanes& of, const Lanes& other) { of = other < of ? other : of; }
+[[gnu::always_inline]] inline void take_root(Lanes& of) {
+  for (int k = 0; k < lanes; ++k) of[k] = std::sqrt(of[k]);
+}
 [[gnu::always_inline]] inline void fold(Lanes x, Lanes y, Lanes z, Folded& to) {
   const Lanes ex = 2.0F * ((0.5F * x + push) - push), ey = 2.0F * ((0.5F * y + push) - push),
               ez = 2.0F * ((0.5F * z + push) - push);
@@ -55,12 +58,12 @@ struct Folded {
   to.c = step_c ? 2.0F - c : c;
 }
 
-/// Squared distances to the nearest bond and node of all points of a block. `nearest` gets them eight at a time,
-/// folded.
+/// Of all points of a block, eight at a time: `nearest` gets them folded and gives squared distances to the nearest
+/// bond and node; `use` gets those, as roots, with the number of the first point and how many bytes of them there are.
 /// @param cells  Quarter cells to a mm.
-template <class Nearest>
+template <class Nearest, class Use>
 [[gnu::always_inline]] inline void each_eight(const PointBlock& block, Vec3f shift, Vec3f cells, const Nearest& nearest,
-                                              float* bond, float* node) {
+                                              const Use& use) {
   std::array<float, 3 * lanes> rest{};
   for (int i = 0; i < block.count; i += lanes) {
     const std::size_t n = sizeof(float) * static_cast<std::size_t>(std::min(lanes, block.count - i));
@@ -77,14 +80,19 @@ template <class Nearest>
     Folded folded;
     fold((x - shift.x) * cells.x, (y - shift.y) * cells.y, (z - shift.z) * cells.z, folded);
     nearest(folded, to_bond, to_node);
-    std::memcpy(bond + i, &to_bond, n);
-    std::memcpy(node + i, &to_node, n);
+    take_root(to_bond);
+    take_root(to_node);
+    use(i, n, to_bond, to_node);
   }
 }
 
-/// From squares to distances.
-[[gnu::always_inline]] inline void take_roots(int count, float unit, float* squared) {
-  for (int i = 0; i < count; ++i) squared[i] = std::sqrt(squared[i]) * unit;
+/// What each_eight() gives, in mm.
+[[gnu::always_inline]] inline auto both_into(float* bond, float* node, float unit) {
+  return [=](int i, std::size_t bytes, const Lanes& to_bond, const Lanes& to_node) __attribute__((always_inline)) {
+    const Lanes b = to_bond * unit, n = to_node * unit;
+    std::memcpy(bond + i, &b, bytes);
+    std::memcpy(node + i, &n, bytes);
+  };
 }
 
 /// Exact distance to the diamond lattice in O(1), by folding.
@@ -155,19 +163,19 @@ struct Crystal final : Lattice {
   [[gnu::always_inline]] static inline void apart_by(const Nearest& nearest, const PointBlock& block, Vec3f shift,
                                                      float quarter, float k, float* bond, float* node) {
     const float inverse = 1.0F / quarter;
-    each_eight(block, shift, {inverse, inverse, inverse / k}, nearest, bond, node);
-    take_roots(block.count, quarter, bond);
-    take_roots(block.count, quarter, node);
+    each_eight(block, shift, {inverse, inverse, inverse / k}, nearest, both_into(bond, node, quarter));
   }
   template <class Nearest>
   [[gnu::always_inline]] static inline void joined_by(const Nearest& nearest, const PointBlock& block, Vec3f shift,
                                                       float quarter, float k, float stick, float ball, float* out) {
-    std::array<float, PointBlock::capacity> bond, node;
-    apart_by(nearest, block, shift, quarter, k, bond.data(), node.data());
-    for (int i = 0; i < block.count; ++i) {
-      const auto n = static_cast<std::size_t>(i);
-      out[i] = std::min(bond[n] - stick, node[n] - ball);
-    }
+    const float inverse = 1.0F / quarter;
+    const auto join = [=](int i, std::size_t bytes, const Lanes& bond, const Lanes& node)
+        __attribute__((always_inline)) {
+      Lanes least = bond * quarter - stick;
+      smaller(least, node * quarter - ball);
+      std::memcpy(out + i, &least, bytes);
+    };
+    each_eight(block, shift, {inverse, inverse, inverse / k}, nearest, join);
   }
 
   FIBROLITE_CLONES static void cubic(const PointBlock& block, Vec3f shift, float quarter, float k, float stick,
@@ -242,9 +250,7 @@ struct AnyCell final : Lattice {
   FIBROLITE_CLONES static void run(const PointBlock& block, Vec3f shift, const Nearest& nearest, float* bond,
                                    float* node) {
     const Vec3f& q = nearest.edges;
-    each_eight(block, shift, {1 / q.x, 1 / q.y, 1 / q.z}, nearest, bond, node);
-    take_roots(block.count, 1, bond);
-    take_roots(block.count, 1, node);
+    each_eight(block, shift, {1 / q.x, 1 / q.y, 1 / q.z}, nearest, both_into(bond, node, 1));
   }
 
   /// Keeps what is nearest to some place a folded point can be at. Places are looked at in a raster; whatever is
