@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -131,7 +132,7 @@ class Finisher {
     }
     next_.resize(2 * layer.quads.size());
     const QuadSplit::Left left = split_(layer.quads, vertices(), next_);
-    if (!left.empty()) mend(layer.quads, left);
+    if (!left.empty()) mend(left);
     hand_on();
     before_ = upper_;
     upper_ = layer.points.size();
@@ -143,45 +144,43 @@ class Finisher {
  private:
   [[nodiscard]] QuadSplit::Vertices vertices() const { return {points_, whole_.empty() ? points_ : whole_, first_}; }
 
-  static Quads quads_of(const std::vector<Mesh::Triangle>& triangles) {
-    Quads quads(triangles.size() / 2);
-    for (std::size_t i = 0; i < quads.size(); ++i) {
-      const auto &one = triangles[2 * i], &other = triangles[2 * i + 1];
-      quads[i] = {one[0], one[1], other[1], other[2]};
-    }
-    return quads;
-  }
-
-  /// A layer's quads, what they have become, and what is wrong with them.
+  /// What a layer's quads have become, and what is wrong with them.
   struct Split {
-    std::span<const Quad> quads;
     std::vector<Mesh::Triangle>& triangles;
+    std::size_t end;  ///< Of the vertices they may have.
     QuadSplit::Left left{};
+
+    [[nodiscard]] Quad quad(std::size_t i) const {
+      const auto &one = triangles[2 * i], &other = triangles[2 * i + 1];
+      return {one[0], one[1], other[1], other[2]};
+    }
   };
   /// Quads that neither diagonal saves: their corners are moved, and all that touch them split again. What has been
   /// handed on already stays.
-  void mend(const Quads& quads, QuadSplit::Left left) {
+  void mend(QuadSplit::Left left) {
     Random random(1, "surface", number_);
-    const Quads waiting = quads_of(waits_.triangles);
-    std::array<Split, 2> layers{Split{waiting, waits_.triangles}, {quads, next_, std::move(left)}};
+    const std::size_t below = first_ + before_ + upper_, end = first_ + points_.size();
+    std::array<Split, 2> layers{Split{waits_.triangles, below}, {next_, end, std::move(left)}};
     for (int round = 0; round < 8 && !(layers[0].left.empty() && layers[1].left.empty()); ++round) {
       moved_.assign(points_.size(), 0);
+      lowest_moved_ = std::numeric_limits<std::uint32_t>::max();
       for (const Split& layer : layers) {
-        for (const std::size_t i : layer.left.degenerate) shake(layer.quads[i], random);
-        for (const std::size_t i : layer.left.astray) flatten(layer.quads[i]);
+        for (const std::size_t i : layer.left.degenerate) shake(layer.quad(i), random);
+        for (const std::size_t i : layer.left.astray) flatten(layer.quad(i));
       }
       for (Split& layer : layers) split_again(layer);
     }
   }
   void split_again(Split& layer) {
     std::vector<std::size_t> touched;
-    for (std::size_t i = 0; i < layer.quads.size(); ++i) {
-      const auto& [a, b, c, d] = layer.quads[i];
+    const std::size_t quads = lowest_moved_ < layer.end ? layer.triangles.size() / 2 : 0;
+    for (std::size_t i = 0; i < quads; ++i) {
+      const auto [a, b, c, d] = layer.quad(i);
       if ((moved_[a - first_] | moved_[b - first_] | moved_[c - first_] | moved_[d - first_]) != 0)
         touched.push_back(i);
     }
     Quads some;
-    for (const std::size_t i : touched) some.push_back(layer.quads[i]);
+    for (const std::size_t i : touched) some.push_back(layer.quad(i));
     std::vector<Mesh::Triangle> triangles(2 * some.size());
     layer.left = split_(some, vertices(), triangles);
     for (std::size_t n = 0; n < touched.size(); ++n)
@@ -193,6 +192,7 @@ class Finisher {
     if (v - first_ < before_) return;  // handed on already
     points_[v - first_] = to;
     moved_[v - first_] = 1;
+    lowest_moved_ = std::min(lowest_moved_, v);
   }
   /// By a thousandth of a voxel in a random direction.
   void shake(const Quad& quad, Random& random) {
@@ -245,6 +245,7 @@ class Finisher {
   FinishedLayer waits_;
   std::vector<Mesh::Triangle> next_;  // of the next
   std::vector<std::uint8_t> moved_;   // is a point, while quads are mended?
+  std::uint32_t lowest_moved_ = 0;
 };
 
 }  // namespace
