@@ -123,7 +123,7 @@ class TriangleBand::Builder {
       box.max().x() = box.min().x() + cell_size - 1;
       Band band{.tree = empty_tree()};
       move_blocks(*before, box.min().x() - 8, all, *band.tree);
-      before.reset();  // one row in memory at a time
+      before.reset();         // one row in memory at a time
       CoordBBox known = box;  // the last blocks of the row before too, so that each two neighbours are seen together
       known.min().x() -= 8;
       if (row + 1 == rows) known.max().x() += 8;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "fibrolite/clones.h"
 #include "fibrolite/error.h"
 
 namespace fibrolite {
@@ -19,7 +20,33 @@ namespace {
 constexpr double most_entries = 2e6;
 constexpr double full_share = 0.95;  // of the volume: peaks under a load or at a corner are not what most members see
 
-/// Values on a lattice, trilinear between.
+/// Which of the entries along one axis lies before each point, and how far that is beyond it, in steps.
+FIBROLITE_CLONES void along(int count, const float* __restrict place, float first, float per_mm, int entries,
+                            int stride, int* __restrict entry, float* __restrict way) {
+  const auto last = static_cast<float>(entries - 1);
+  for (int n = 0; n < count; ++n) {
+    const float s = (place[n] - first) * per_mm, low = s < 0 ? 0 : s, steps = last < low ? last : low;
+    const int whole = static_cast<int>(steps), cell = whole < entries - 2 ? whole : entries - 2;
+    entry[n] += stride * cell;
+    way[n] = steps - static_cast<float>(cell);
+  }
+}
+
+/// Trilinear: `row` and `layer` are the ways to the next entry along y and z.
+FIBROLITE_CLONES void between(int count, const float* __restrict value, int row, int layer, const int* __restrict entry,
+                              const float* __restrict x, const float* __restrict y, const float* __restrict z,
+                              float* __restrict out) {
+  for (int n = 0; n < count; ++n) {
+    const float* const v = value + entry[n];
+    const float a = v[0] + x[n] * (v[1] - v[0]), b = v[row] + x[n] * (v[row + 1] - v[row]);
+    const float c = v[layer] + x[n] * (v[layer + 1] - v[layer]);
+    const float d = v[layer + row] + x[n] * (v[layer + row + 1] - v[layer + row]);
+    const float low = a + y[n] * (b - a), high = c + y[n] * (d - c);
+    out[n] = low + z[n] * (high - low);
+  }
+}
+
+/// Values on a lattice, trilinear between. At most two million, so that an int numbers them.
 struct Table final : Shape::Function {
   Vec3d origin{};
   double step = 1, steepest = 0;
@@ -35,26 +62,17 @@ struct Table final : Shape::Function {
     return origin + step * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
   }
   void evaluate(const PointBlock& block, float* out) const override {
+    std::array<int, PointBlock::capacity> entry;
+    std::array<std::array<float, PointBlock::capacity>, 3> way;
     const Vec3f from = to_float(origin);
-    const std::array<float, 3> first{from.x, from.y, from.z};
-    const std::array<const float*, 3> place{block.x, block.y, block.z};
     const auto per_mm = static_cast<float>(1 / step);
-    for (int n = 0; n < block.count; ++n) {
-      std::array<int, 3> cell{};
-      std::array<float, 3> w{};
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const float s = std::clamp((place[axis][n] - first[axis]) * per_mm, 0.0F, static_cast<float>(size[axis] - 1));
-        cell[axis] = std::min(static_cast<int>(s), size[axis] - 2);
-        w[axis] = s - static_cast<float>(cell[axis]);
-      }
-      const auto along_x = [&](int j, int k) {
-        const float* low = value.data() + at(cell[0], cell[1] + j, cell[2] + k);
-        return low[0] + w[0] * (low[1] - low[0]);
-      };
-      const float low = along_x(0, 0) + w[1] * (along_x(1, 0) - along_x(0, 0));
-      const float high = along_x(0, 1) + w[1] * (along_x(1, 1) - along_x(0, 1));
-      out[n] = low + w[2] * (high - low);
-    }
+    const int n = block.count;
+    std::fill_n(entry.begin(), n, 0);
+    along(n, block.z, from.z, per_mm, size[2], size[1] * size[0], entry.data(), way[2].data());
+    along(n, block.y, from.y, per_mm, size[1], size[0], entry.data(), way[1].data());
+    along(n, block.x, from.x, per_mm, size[0], 1, entry.data(), way[0].data());
+    between(n, value.data(), size[0], size[1] * size[0], entry.data(), way[0].data(), way[1].data(), way[2].data(),
+            out);
   }
   [[nodiscard]] double lipschitz() const override { return steepest; }
 };
