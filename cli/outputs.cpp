@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "outputs.h"
 
+#include <fcntl.h>
+#include <stdio.h>  // NOLINT(modernize-deprecated-headers): renameat2 is no part of <cstdio>
 #include <unistd.h>
 
 #include <atomic>
@@ -41,6 +43,15 @@ fs::path hidden_name(const fs::path& target) {
   std::string name = ".";
   name += target.stem().string() + "." + std::to_string(getpid()) + ".new" + target.extension().string();
   return target.parent_path() / name;
+}
+
+/// Two files trade their names. False where that cannot be done (not all file systems can), and nothing is changed.
+bool exchange(const fs::path& a, const fs::path& b) {
+#ifdef RENAME_EXCHANGE
+  return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) == 0;
+#else
+  return false;
+#endif
 }
 
 }  // namespace
@@ -86,17 +97,26 @@ std::vector<fs::path> Outputs::hidden() const {
 
 void Outputs::commit() {
   in_commit = true;
-  std::error_code error;
-  for (std::size_t i = 0; i < items_.size() && !error; ++i) {
-    fs::rename(items_[i].hidden, items_[i].target, error);
+  // What is replaced keeps the hidden name until all are in place.
+  std::vector<bool> kept(items_.size(), false);
+  std::error_code error, ignored;
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    const auto& [asked, target, hidden, existed] = items_[i];
+    kept[i] = existed && fs::is_regular_file(target, ignored) && exchange(hidden, target);
+    if (!kept[i]) fs::rename(hidden, target, error);
     if (!error) continue;
     for (std::size_t j = 0; j < i; ++j) {
-      std::error_code ignored;
-      if (!items_[j].existed) fs::remove(items_[j].target, ignored);
+      if (kept[j]) {
+        exchange(items_[j].hidden, items_[j].target);
+      } else if (!items_[j].existed) {
+        fs::remove(items_[j].target, ignored);
+      }
     }
     in_commit = false;
-    throw Error(Code::Io, "the output cannot be put in place: " + error.message(), items_[i].asked.string());
+    throw Error(Code::Io, "the output cannot be put in place: " + error.message(), asked.string());
   }
+  for (std::size_t i = 0; i < items_.size(); ++i)
+    if (kept[i]) fs::remove(items_[i].hidden, ignored);
   in_commit = false;
 }
 

@@ -23,7 +23,8 @@ class Outputs {
   [[nodiscard]] const std::filesystem::path& place(const std::filesystem::path& target) const;
   /// All such places.
   [[nodiscard]] std::vector<std::filesystem::path> hidden() const;
-  /// @throws Error Io; then none of the outputs is there.
+  /// @throws Error Io; then none of the outputs is there, and what they were to replace still is (where the file system
+  /// cannot exchange two names, files replaced before the one that failed are gone).
   void commit();
 
   /// For a signal handler: remove what is written so far.

@@ -8,7 +8,8 @@
 
 namespace fibrolite {
 
-/// Shares the tree; no copy. World mm, class GRID_LEVEL_SET.
+/// Shares the tree; no copy, unless values inside are told deeper than the band (narrowed()). World mm, class
+/// GRID_LEVEL_SET.
 [[nodiscard]] openvdb::FloatGrid::ConstPtr to_vdb(const Solid& solid);
 /// Takes a level set with uniform voxels whose lattice passes through the world origin.
 /// @throws Error BadInput otherwise.

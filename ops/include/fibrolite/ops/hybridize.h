@@ -37,7 +37,7 @@ struct HybridizeParams {
   std::shared_ptr<KeptWork> kept{};
 };
 struct Hybrid {
-  Solid solid;  ///< The printed solid.
+  Solid solid;  ///< The printed solid. Values inside may be told deeper than the band: narrowed() before to_vdb().
   Parts parts;
   Labels candidates;  ///< Of the partition, before touching bulk became one part; of other infills: one.
   std::vector<Interface> interfaces;
