@@ -86,13 +86,13 @@ class ClosedChecker {
     mask_ = needed - 1;
   }
 
-  /// Each thread has a share of the vertices, and goes through all triangles: that is less than what it costs to share
-  /// the counts.
+  /// Each share of the vertices goes through all triangles: that is less than what it costs to share the counts. Half
+  /// of the threads have enough to do with the layer that is made meanwhile.
   void fill(const MeshLayer& layer, std::uint32_t end) {
     const auto first = static_cast<std::uint32_t>(layer.first),
                fresh = first + static_cast<std::uint32_t>(layer.before);
     const std::size_t shares =
-        std::clamp<std::size_t>(static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()), 1, 16);
+        std::clamp<std::size_t>(static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()) / 2, 1, 16);
     std::vector<std::vector<More>> more(shares);
     std::atomic<bool> too_many{false};
     tbb::parallel_for(std::size_t{0}, shares, [&](std::size_t share) {

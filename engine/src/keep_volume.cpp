@@ -41,8 +41,9 @@ Four cross(Four a, Four b) {
 }
 Vec3s vec(Four f) { return {f[0], f[1], f[2]}; }
 
-/// Layers that are worked on at once, for the threads to share; no more than that, for they wait in memory.
-std::size_t batch() { return static_cast<std::size_t>(std::clamp(tbb::this_task_arena::max_concurrency(), 2, 16)); }
+/// Layers that are worked on at once. Beside them the next ones are made, which keeps half of the threads busy; and
+/// they wait in memory.
+std::size_t batch() { return static_cast<std::size_t>(std::clamp(tbb::this_task_arena::max_concurrency() / 2, 1, 16)); }
 
 using Range = tbb::blocked_range<std::size_t>;
 

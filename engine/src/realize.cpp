@@ -3,6 +3,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <array>
@@ -52,24 +53,32 @@ class Blocks {
   [[nodiscard]] Solid run(const std::vector<openvdb::Coord>& origins) const {
     auto grid = make_grid(spec_);
     Tree& tree = grid->tree();
-    // Batches bound what waits to be put into the tree, and let progress and cancel be seen.
-    constexpr std::size_t batch = 4096;
-    std::vector<Outcome> outcomes(std::min(batch, origins.size()));
+    // Batches bound what waits to be put into the tree, and let progress and cancel be seen. One is put there while the
+    // next is made.
+    constexpr std::size_t batch = 2048;
+    std::vector<Outcome> made(std::min(batch, origins.size())), put(made.size());
+    tbb::task_group behind;
     for (std::size_t start = 0; start < origins.size(); start += batch) {
       context_.check();
       const std::size_t n = std::min(batch, origins.size() - start);
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) outcomes[i] = block(origins[start + i]);
+        for (std::size_t i = range.begin(); i < range.end(); ++i) made[i] = block(origins[start + i]);
       });
-      for (std::size_t i = 0; i < n; ++i) {
-        if (outcomes[i].leaf != nullptr) {
-          tree.addLeaf(outcomes[i].leaf.release());
-        } else if (outcomes[i].inside) {
-          tree.addTile(1, origins[start + i], -band_, false);
+      behind.wait();
+      std::swap(made, put);
+      behind.run([&, start, n] {
+        openvdb::FloatGrid::Accessor access(tree);
+        for (std::size_t i = 0; i < n; ++i) {
+          if (put[i].leaf != nullptr) {
+            access.addLeaf(put[i].leaf.release());
+          } else if (put[i].inside) {
+            access.addTile(1, origins[start + i], -band_, false);
+          }
         }
-      }
+      });
       context_.progress(static_cast<double>(start + n) / static_cast<double>(origins.size()));
     }
+    behind.wait();
     return make_solid(grid, spec_);
   }
 
@@ -138,7 +147,8 @@ class Blocks {
     Leaf::NodeMaskType active;
     for (std::size_t n = 0; n < in_band.size(); ++n)
       active.getWord<std::uint64_t>(static_cast<openvdb::Index>(n)) = in_band[n];
-    auto leaf = std::make_unique<Leaf>(origin, band_, false);
+    auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), origin);  // its samples not filled yet
+    leaf->buffer().allocate();
     std::copy(values.begin(), values.end(), leaf->buffer().data());
     leaf->setValueMask(active);
     return {std::move(leaf), false};

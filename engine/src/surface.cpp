@@ -20,6 +20,7 @@
 #include "keep_volume.h"
 #include "quad_envelope.h"
 #include "quad_split.h"
+#include "unwritten.h"
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -98,8 +99,10 @@ class LayerStore {
   std::size_t points_ = 0, quads_ = 0;
 };
 
+using Places = std::vector<Vec3f, Unwritten<Vec3f>>;
+
 struct FinishedLayer {
-  std::vector<Vec3f> vertices;
+  Places vertices;
   std::size_t first = 0, before = 0;
   std::vector<Mesh::Triangle> triangles;
 };
@@ -223,12 +226,13 @@ class Finisher {
 
   void hand_on() {
     if (before_ + upper_ == 0) return;
-    waits_.vertices.assign(points_.begin(), points_.begin() + static_cast<std::ptrdiff_t>(before_ + upper_));
+    const auto below = static_cast<std::ptrdiff_t>(before_);
+    waits_.vertices.assign(points_.begin() + below, points_.end());
+    std::swap(waits_.vertices, points_);
+    waits_.vertices.resize(before_ + upper_);
     waits_.first = first_;
     waits_.before = before_;
     use_(waits_);
-    const auto below = static_cast<std::ptrdiff_t>(before_);
-    points_.erase(points_.begin(), points_.begin() + below);
     if (!whole_.empty()) whole_.erase(whole_.begin(), whole_.begin() + below);
     first_ += before_;
   }
@@ -239,8 +243,8 @@ class Finisher {
   double voxel_mm_;
   const Use use_;
   // Of the layer below the one that waits, that one, and for a moment the next.
-  std::vector<Vec3f> points_;
-  std::vector<Vec3f> whole_;  // the same after a whole move, if that is another step
+  Places points_;
+  Places whole_;  // the same after a whole move, if that is another step
   std::size_t first_ = 0, before_ = 0, upper_ = 0, number_ = 0;
   FinishedLayer waits_;
   std::vector<Mesh::Triangle> next_;  // of the next
