@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #define FIBROLITE_INLINE static inline __attribute__((always_inline))
 // Vectors are passed only between inlined functions, so no call depends on how they are passed.
@@ -36,16 +37,34 @@ namespace avx512 {
 #include "triangle_kernel.inc"
 }
 #pragma GCC pop_options
-namespace {
-const bool has_avx2 = __builtin_cpu_supports("avx2") != 0;
-const bool has_avx512 = __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
-                        __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512bw") != 0;
-}  // namespace
-#define FIBROLITE_CALL(function, ...) \
-  has_avx512 ? avx512::function(__VA_ARGS__) : (has_avx2 ? avx2::function(__VA_ARGS__) : plain::function(__VA_ARGS__))
-#else
-#define FIBROLITE_CALL(function, ...) plain::function(__VA_ARGS__)
+#define FIBROLITE_MORE_KERNELS
 #endif
+
+namespace {
+
+std::vector<TriangleKernels> kernels_that_run() {
+  std::vector<TriangleKernels> all;
+#ifdef FIBROLITE_MORE_KERNELS
+  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
+      __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512bw") != 0)
+    all.push_back({"AVX-512", avx512::nearest_to_centers, avx512::cull, avx512::distances_64});
+  if (__builtin_cpu_supports("avx2") != 0)
+    all.push_back({"AVX2", avx2::nearest_to_centers, avx2::cull, avx2::distances_64});
+#endif
+  all.push_back({"plain", plain::nearest_to_centers, plain::cull, plain::distances_64});
+  return all;
+}
+
+}  // namespace
+
+std::span<const TriangleKernels> triangle_kernels() {
+  static const std::vector<TriangleKernels> all = kernels_that_run();
+  return all;
+}
+
+namespace {
+const TriangleKernels fastest = triangle_kernels().front();
+}  // namespace
 
 TriangleFrame make_frame(Vec3d a, Vec3d b, Vec3d c, std::uint32_t triangle) {
   std::array<Vec3d, 3> v{a, b, c};
@@ -110,17 +129,17 @@ ClosestFeature closest_feature(const TriangleFrame& t, Vec3f p) {
 
 void nearest_to_centers(const TriangleFrame* frames, const std::uint32_t* list, int count, const EightBoxes& boxes,
                         EightNearest& nearest) {
-  FIBROLITE_CALL(nearest_to_centers, frames, list, count, boxes, nearest);
+  fastest.nearest_to_centers(frames, list, count, boxes, nearest);
 }
 
 void cull(const TriangleFrame* frames, const std::uint32_t* list, int count, const EightBoxes& boxes,
           const EightNearest& nearest, const float reach[8], std::uint32_t* const lists[8], int counts[8]) {
-  FIBROLITE_CALL(cull, frames, list, count, boxes, nearest, reach, lists, counts);
+  fastest.cull(frames, list, count, boxes, nearest, reach, lists, counts);
 }
 
 void distances_64(const TriangleFrame* frames, const std::uint32_t* list, int count, Vec3f corner, float d2[64],
                   std::int32_t frame[64]) {
-  FIBROLITE_CALL(distances_64, frames, list, count, corner, d2, frame);
+  fastest.distances_64(frames, list, count, corner, d2, frame);
 }
 
 }  // namespace fibrolite

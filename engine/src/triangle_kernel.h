@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "fibrolite/vec.h"
@@ -56,5 +57,15 @@ void cull(const TriangleFrame* frames, const std::uint32_t* list, int count, con
 /// Squared distances and nearest frames of the 4x4x4 samples from `corner` on, spacing 1; (x * 4 + y) * 4 + z.
 void distances_64(const TriangleFrame* frames, const std::uint32_t* list, int count, Vec3f corner, float d2[64],
                   std::int32_t frame[64]);
+
+/// The three of one instruction set.
+struct TriangleKernels {
+  const char* instructions;
+  decltype(&fibrolite::nearest_to_centers) nearest_to_centers;
+  decltype(&fibrolite::cull) cull;
+  decltype(&fibrolite::distances_64) distances_64;
+};
+/// Those that the processor can run, the fastest first. All give the same bits.
+[[nodiscard]] std::span<const TriangleKernels> triangle_kernels();
 
 }  // namespace fibrolite
