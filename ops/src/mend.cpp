@@ -34,18 +34,36 @@ void add_balls(const std::vector<Spot>& spots, bool wall, const MendParams& para
   }
 }
 
+/// A ball about what a hole has left on too thin a neck, where no tie can lie: a sliver between the hole and a face. It
+/// leaves half of the shell.
+std::vector<Capsule> slivers(const Tied& tied, const Shape& lumen, const MendParams& params) {
+  std::vector<Capsule> balls;
+  for (const Piece& piece : tied.unreached) {
+    const double size = std::cbrt(0.75 / std::numbers::pi * piece.volume_mm3);
+    const double radius = std::min(size + 0.5 * params.tie.strut_mm, -1.0 * lumen(piece.sample_mm));
+    if (size < 0.5 * params.drain_mm && radius > 0) balls.push_back({piece.sample_mm, piece.sample_mm, radius});
+  }
+  return balls;
+}
+
 }  // namespace
 
 Shape with_mends(const Shape& whole, const Shape& body, const Mended& m) {
   Shape result = with_ties(whole, body, m.tied.changes);
   if (!m.thickened.empty()) result = unite({result, intersect({body, capsules(m.thickened)})});
   if (!m.pillars.empty()) result = unite({result, intersect({body, shape(m.pillars)})});
-  if (!m.drains.empty()) result = subtract(result, capsules(shapes(m.drains)));
+  if (!m.drains.empty()) result = subtract(result, m.keep_out());
   return result;
 }
 
+Shape Mended::keep_out() const {
+  std::vector<Capsule> all = shapes(drains);
+  all.insert(all.end(), shaved.begin(), shaved.end());
+  return capsules(all);
+}
+
 Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const Context& context) {
-  Mended out{tied, {}, {}, {}, 0};
+  Mended out{.tied = tied};
   const double voxel = body.grid().voxel_mm;
   const Shape b = distance_to(body), lumen = offset(b, -0.5 * params.shell_mm);
   const PillarParams bearing{.print = params.print,
@@ -73,14 +91,23 @@ Mended mend(const Tied& tied, const Solid& body, const MendParams& params, const
   out.tied.solid = filled.solid;
   out.tied.left = filled.left;
   out.voids_filled = filled.filled;
+  const auto take_away = [&](const std::vector<Capsule>& holes) {
+    TieParams around = params.tie;
+    around.keep_out = out.keep_out();
+    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(holes));
+    out.tied = tie_again(out.tied, realize(drilled, body, context), body, around, context);
+  };
   for (int round = 0; round < rounds && !out.tied.left.cavities.empty(); ++round) {
     const auto holes =
         drains(out.tied.solid, {.hole_mm = params.drain_mm, .up = params.up, .reach_mm = 4 * params.shell_mm}, context);
     out.drains.insert(out.drains.end(), holes.begin(), holes.end());
-    TieParams around = params.tie;
-    around.keep_out = capsules(shapes(out.drains));
-    const Shape drilled = subtract(distance_to(out.tied.solid), capsules(shapes(holes)));
-    out.tied = tie_again(out.tied, realize(drilled, body, context), body, around, context);
+    take_away(shapes(holes));
+    for (int shave = 0; shave < rounds && !out.tied.unreached.empty(); ++shave) {
+      const std::vector<Capsule> balls = slivers(out.tied, lumen, params);
+      if (balls.empty()) break;
+      out.shaved.insert(out.shaved.end(), balls.begin(), balls.end());
+      take_away(balls);
+    }
   }
   return out;
 }

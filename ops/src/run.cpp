@@ -204,6 +204,35 @@ Shape lattice(const Parts& parts, const std::vector<Fill>& fills) {
   return unite(std::move(all));
 }
 
+/// What --fix leaves, in words.
+std::vector<std::string> left_unmended(const Printable& found, const Recipe& recipe, bool any_sticks) {
+  const PrintParams& limits = recipe.print;
+  std::vector<std::string> texts;
+  const auto places = [](const PrintFault& fault) {
+    return std::to_string(fault.places) + (fault.places == 1 ? " place" : " places");
+  };
+  if (found.thin_walls.places > 0)
+    texts.push_back("--fix leaves " + places(found.thin_walls) + " thinner than print.wall_mm, the thinnest " +
+                    number_text(found.thin_walls.least_mm, 2) +
+                    " mm (print.thin_walls in the report): what the model itself makes so thin stays; else use a "
+                    "smaller --voxel");
+  if (found.small_gaps.places > 0)
+    texts.push_back("--fix leaves " + places(found.small_gaps) + " where a gap is narrower than print.gap_mm " +
+                    "(print.small_gaps in the report): use a smaller --voxel");
+  if (found.overhangs.area_mm2 <= 0.01 * found.lumen_mm2) return texts;
+  const std::string much = number_text(100 * found.overhangs.area_mm2 / found.lumen_mm2, 2) + " % of the faces inside";
+  if (const double leaning = leaning_deg(recipe); any_sticks && leaning > steepest_deg(limits)) {
+    texts.push_back("the crystal's sticks lean " + number_text(leaning, 3) +
+                    " degrees from upright, more than print.overhang_deg allows, which --fix leaves: make the "
+                    "cell of tcs.cell_mm taller, or leave out tcs.rotate_deg");
+  } else {
+    texts.push_back("--fix leaves " + much +
+                    " steeper than print.overhang_deg allows (print.overhangs in the report): what is curved, as a "
+                    "sheet of crystal is, faces every way; sticks with tcs.stretch_z do not");
+  }
+  return texts;
+}
+
 }  // namespace
 
 bool stretch_to_print(Recipe& recipe, InfillKind infill) {
@@ -222,7 +251,7 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& part
   const PrintParams& limits = recipe.print;
   const double voxel = body.grid().voxel_mm, shell_mm = recipe.shell.thickness_mm;
   const double drain_mm = limits.drain_mm.value_or(fix ? std::max(default_drain_mm, 2 * voxel) : 0);
-  Mended out{tied, {}, {}, {}, 0};
+  Mended out{.tied = tied};
   const bool mending = fix || drain_mm > 0;
   if (!mending && !limits.check) return out;
   if (mending) {
@@ -237,7 +266,7 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& part
                 .lattice = lattice(parts, fills)},
                context);
     TieParams around = ties;
-    around.keep_out = capsules(shapes(out.drains));
+    around.keep_out = out.keep_out();
     const Solid& solid = out.tied.solid;  // from here on the whole
     Tied rest{.solid = solid, .left = out.tied.left, .unreached = out.tied.unreached};
     rest = trim(std::move(rest), distance_to(solid), body, sticks, shell_mm, around, context);
@@ -248,12 +277,9 @@ Mended checked_and_mended(const Tied& tied, const Solid& body, const Parts& part
   report.print.found = printable(out.tied.solid, lumen, limits, recipe.verify.up, node_mm(fills, limits), context);
   report.print.checked = true;
   const Printable& found = report.print.found;
-  if (const double leaning = leaning_deg(recipe);
-      fix && !sticks.empty() && leaning > steepest_deg(limits) && found.overhangs.area_mm2 > 0.01 * found.lumen_mm2)
-    report.warnings.push_back(
-        "the crystal's sticks lean " + number_text(leaning, 3) +
-        " degrees from upright, more than print.overhang_deg allows, which --fix leaves: make the "
-        "cell of tcs.cell_mm taller, or leave out tcs.rotate_deg");
+  if (fix) {
+    for (std::string& text : left_unmended(found, recipe, !sticks.empty())) report.warnings.push_back(std::move(text));
+  }
   report.print.drains = out.drains;
   report.print.thickened = static_cast<std::int64_t>(out.thickened.size());
   report.print.pillars = static_cast<std::int64_t>(out.pillars.size());
@@ -350,7 +376,7 @@ std::vector<NamedSolid> steps(const Solid& body, const Solid& raw, const Hybrid&
   if (const auto struts = mended.tied.struts(); !struts.empty()) add("ties", capsules(struts));
   if (!mended.thickened.empty()) add("thickened", capsules(mended.thickened));
   if (!mended.pillars.empty()) add("pillars", shape(mended.pillars));
-  if (!mended.drains.empty()) add("drains", capsules(shapes(mended.drains)));
+  if (!mended.drains.empty()) add("drains", mended.keep_out());
   // What cleaning changed: material that went, void that was filled.
   const Shape before = with_mends(distance_to(raw), b, mended);
   const Shape after = distance_to(made.solid);

@@ -149,6 +149,18 @@ void report_solid(const Tied& tied, const std::vector<Fill>& fills, const Volume
   out.specks_removed = tied.dropped;
   out.voids_filled = tied.filled;
   report.model.volume_mm3 = volumes.body_mm3;
+  const auto place = [](Vec3d p) {
+    return number_text(p.x, 4) + ", " + number_text(p.y, 4) + ", " + number_text(p.z, 4);
+  };
+  if (out.unreached > 0)
+    report.warnings.push_back("solid.unreached: " + std::to_string(out.unreached) +
+                              (out.unreached == 1 ? " place hangs" : " places hang") + " on less than " +
+                              number_text(out.neck_mm, 2) + " mm, the largest at " +
+                              place(tied.unreached.front().sample_mm) + " mm: use a smaller --voxel");
+  if (out.dangling > 0)
+    report.warnings.push_back("solid.dangling: " + std::to_string(out.dangling) +
+                              (out.dangling == 1 ? " member ends" : " members end") +
+                              " in a void: use a smaller --voxel");
   if (out.pieces > 1) {
     report.warnings.push_back("the solid has " + std::to_string(out.pieces) +
                               " pieces: the model itself has pieces too far apart to tie");

@@ -266,6 +266,24 @@ TEST(Hybridize, fix_stretches_a_crystal_that_leans_too_far) {
   EXPECT_EQ(fixed.solid.dangling, 0);
 }
 
+TEST(Hybridize, what_fix_leaves_is_said) {
+  const auto made = [](TcsForm form) {
+    HybridizeParams params{.recipe = sturdy(), .infill = InfillKind::Tcs, .voxel_mm = 0.4, .fix = true};
+    params.recipe.tcs.form = form;
+    params.recipe.tcs.cell_mm = 12;
+    return hybridized(testing::cube(26), params).report;
+  };
+  const auto said = [](const Report& report, const std::string& what) {
+    return std::any_of(report.warnings.begin(), report.warnings.end(),
+                       [&](const std::string& text) { return text.find(what) != std::string::npos; });
+  };
+  const Report sheet = made(TcsForm::Sheet), sticks = made(TcsForm::Sticks);
+  EXPECT_GT(sheet.print.found.overhangs.area_mm2, 0.01 * sheet.print.found.lumen_mm2);
+  EXPECT_TRUE(said(sheet, "faces every way"));
+  EXPECT_LT(sticks.print.found.overhangs.area_mm2, 0.01 * sticks.print.found.lumen_mm2);
+  EXPECT_FALSE(said(sticks, "--fix leaves"));
+}
+
 TEST(Hybridize, the_steps_united_by_openvdb_are_the_fused_solid) {
   const Outcome out = hybridized(model("cylinder_on_box"), {.recipe = sturdy(), .voxel_mm = 0.5, .steps = true});
   std::map<std::string, Solid> step;

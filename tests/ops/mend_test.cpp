@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/realize.h"
 
 namespace fibrolite {
@@ -37,7 +38,7 @@ TEST(Mend, AThinWallGetsAsThickAsAsked) {
   const Case thin(placed(cuboid({{-20, -20, -0.25}, {20, 20, 0.25}}), frame_along({}, {0.3, 0, 1})));
   const double before = thin.tied.solid.volume_mm3();
   const Mended made = mend(thin.tied, thin.body, params(true, 0));
-  EXPECT_EQ(thin.checked(Mended{thin.tied, {}, {}, {}, 0}, print).thin_walls.places, 1);
+  EXPECT_EQ(thin.checked(Mended{thin.tied}, print).thin_walls.places, 1);
   EXPECT_EQ(thin.checked(made, print).thin_walls.places, 0);
   // 0.3 mm more over the section of the lumen.
   const double section = 14 * 14 * std::sqrt(1 + 0.09);
@@ -51,7 +52,7 @@ TEST(Mend, AThinWallGetsAsThickAsAsked) {
 
 TEST(Mend, ASmallGapIsClosed) {
   const Case split(subtract(everything(), cuboid({{-5, -20, -0.2}, {5, 20, 0.25}})));
-  ASSERT_GT(split.checked(Mended{split.tied, {}, {}, {}, 0}, print).small_gaps.places, 0);
+  ASSERT_GT(split.checked(Mended{split.tied}, print).small_gaps.places, 0);
   const Mended made = mend(split.tied, split.body, params(true, 0));
   EXPECT_EQ(split.checked(made, print).small_gaps.places, 0);
   EXPECT_NEAR(made.tied.solid.volume_mm3(), 16 * 16 * 16, 0.002 * 4096);
@@ -65,7 +66,7 @@ TEST(Mend, ACeilingGetsPillars) {
     PrintParams steep = print;
     steep.overhang_deg = 45;
     const auto checked = [&](const Mended& made) { return chamber.checked(made, steep); };
-    const PrintFault before = checked({chamber.tied, {}, {}, {}, 0}).overhangs;
+    const PrintFault before = checked(Mended{chamber.tied}).overhangs;
     ASSERT_EQ(before.places, 1);
     EXPECT_NEAR(before.area_mm2, 14 * 14 * std::hypot(1, slope), 14);
     MendParams asked = params(true, 0);
@@ -125,6 +126,25 @@ TEST(Mend, EveryVoidDrainsOrIsFilled) {
   EXPECT_EQ(made.tied.solid.volume_mm3(), results[1].tied.solid.volume_mm3());
   for (std::size_t i = 0; i < made.drains.size(); ++i)
     EXPECT_EQ(made.drains[i].place_mm, results[1].drains[i].place_mm);
+}
+
+/// A sheet of crystal parts its room in two voids; a hole through it left two slivers beside it.
+TEST(Mend, AHoleLeavesNothingOnTooThinANeck) {
+  const Solid body = realize(block, room, {.voxel_mm = voxel, .inside_vox = 8});
+  const Shape sheet = crystal({.form = TcsForm::Sheet, .cell_mm = 5.6, .wall_mm = 0.6, .shift_mm = {2.22, 4.44, 0}});
+  const Shape shell = subtract(block, lumen), whole = unite({shell, intersect({block, sheet})});
+  MendParams around = params(false, 2);
+  around.tie = {.neck_mm = 0.5, .anchor = shell};
+  const Tied tied = tie(realize(whole, body), whole, body, around.tie);
+  ASSERT_GE(tied.left.cavities.size(), 2U);
+  ASSERT_EQ(tied.unreached.size(), 0U);
+  const Mended made = mend(tied, body, around);
+  EXPECT_EQ(made.tied.left.cavities.size(), 0U);
+  EXPECT_EQ(made.tied.left.material.size(), 1U);
+  EXPECT_EQ(made.tied.unreached.size(), 0U);
+  ASSERT_GT(made.shaved.size(), 0U);
+  const Solid again = realize(with_mends(whole, distance_to(body), made), body);
+  EXPECT_NEAR(again.volume_mm3(), made.tied.solid.volume_mm3(), 1e-3 * again.volume_mm3());
 }
 
 TEST(Mend, NothingToMendNothingChanged) {

@@ -24,11 +24,15 @@ struct MendParams {
   Shape lattice = nothing();  ///< And those on the surface of this (PillarParams::lattice).
 };
 struct Mended {
-  Tied tied;                       ///< As before, with what was mended; changes of both.
-  std::vector<Capsule> thickened;  ///< Balls in walls that were too thin and gaps that were too small.
-  std::vector<Pillar> pillars;
-  std::vector<Drain> drains;
+  Tied tied;                         ///< As before, with what was mended; changes of both.
+  std::vector<Capsule> thickened{};  ///< Balls in walls that were too thin and gaps that were too small.
+  std::vector<Pillar> pillars{};
+  std::vector<Drain> drains{};
+  std::vector<Capsule> shaved{};  ///< Slivers beside holes, which hung on too thin a neck.
   std::int64_t voids_filled = 0;  ///< Too small for a hole.
+
+  /// Where no tie may lie: holes, and what was shaved off beside them.
+  [[nodiscard]] Shape keep_out() const;
 };
 /// A wall is thickened by balls of wall_mm in its middle, a gap closed by balls that reach tie.strut_mm / 2 into both
 /// its faces, overhangs get pillars, all inside `body`: what the model itself makes too thin stays. Then voids with
