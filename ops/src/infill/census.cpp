@@ -32,7 +32,7 @@ FibreCensus census(const FloatImage& membranes, double pixel, double least_area,
   const auto counts = [&](int x, int y) { return lumen == nullptr || (*lumen)(x, y) < 0; };
   Image<std::uint8_t> open(membranes.width, membranes.height);
   std::vector<double> thickness;
-  double inside = 0, hollow = 0;
+  double inside = 0, hollow = 0, deepest = 0;
   FloatImage scaled = membranes;
   for (float& d : scaled.pixels) d /= static_cast<float>(pixel);
   for (int y = 0; y < open.height; ++y)
@@ -43,6 +43,7 @@ FibreCensus census(const FloatImage& membranes, double pixel, double least_area,
       hollow += open(x, y);
       const bool rim = x == 0 || y == 0 || x + 1 == open.width || y + 1 == open.height;
       if (rim || membranes(x, y) >= 0) continue;
+      deepest = std::max(deepest, -1.0 * scaled(x, y));
       if (const double t = thickness_at(scaled, x, y); t > 0) thickness.push_back(t);
     }
 
@@ -73,6 +74,8 @@ FibreCensus census(const FloatImage& membranes, double pixel, double least_area,
     const auto middle = thickness.begin() + static_cast<std::ptrdiff_t>(thickness.size() / 2);
     std::nth_element(thickness.begin(), middle, thickness.end());
     result.membrane = *middle * pixel;
+  } else {
+    result.membrane = 2 * deepest * pixel;  // lumps without a middle line
   }
   return result;
 }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <span>
 #include <string>
@@ -16,6 +17,7 @@
 
 #include "child_process.h"
 #include "fibrolite/error.h"
+#include "fibrolite/ops/text.h"
 #include "helper_program.h"
 #include "infill/cells.h"
 #include "infill/census.h"
@@ -28,6 +30,9 @@ constexpr int max_side_px = 2048;          // larger templates are halved: fibre
 constexpr double distance_unit = 64;       // a pixel of distance in the integer height image
 constexpr double least_likeness = 0.1;     // of white noise 0; a photograph buried in noise as strong as itself has 0.3
 constexpr double least_two_levels = 0.68;  // of noise 0.64; fibres that can be told apart have 0.72 or more
+constexpr double clear_two_levels = 0.85;  // grain of coherent light has up to 0.77
+constexpr double least_fatness = 1.5;      // of fibres over membranes, if levels are not clear; of such grain 1.3
+constexpr double least_fibre_px = 6;       // wide; noise that has been enlarged has 3
 constexpr double saddle_ratio = 0.72;      // a waist wider than this share of the smaller fibre is no border
 
 /// 8-bit, no larger than max_side_px, light evened out.
@@ -182,6 +187,10 @@ FloatImage distance_to_membranes(const LabelImage& label) {
 constexpr const char* better_image =
     "use a sharp cross-section with fibres apart from each other, at least 12 pixels wide";
 
+[[noreturn]] void nothing_stands_out() {
+  throw Error(Code::BadInput, "nothing stands out in the micrograph: it is even, or noise", "template image",
+              better_image);
+}
 [[noreturn]] void too_few(int found) {
   throw Error(Code::BadInput, "found " + std::to_string(found) + " fibres in the micrograph, at least 4 are needed",
               "template image", better_image);
@@ -198,9 +207,8 @@ FibreMap find_fibres(const GrayImage& micrograph) try {
   cv::GaussianBlur(gray, gray, {3, 3}, 0.7);
   cv::Mat fibre;
   cv::threshold(gray, fibre, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
-  if (alike < least_likeness || two_levels(gray, fibre) < least_two_levels)
-    throw Error(Code::BadInput, "nothing stands out in the micrograph: it is even, or noise", "template image",
-                better_image);
+  const double levels = two_levels(gray, fibre);
+  if (alike < least_likeness || levels < least_two_levels) nothing_stands_out();
   if (!bright_is_fibre(fibre)) {
     gray = 255 - gray;
     fibre = ~fibre;
@@ -239,6 +247,13 @@ FibreMap find_fibres(const GrayImage& micrograph) try {
   clear_membranes(map.label);
   map.census = census(distance_to_membranes(map.label), 1, 0);
   map.census.fibres = map.fibres;
+  const double width = std::sqrt(4 / std::numbers::pi * map.census.mean_area);
+  if (levels < clear_two_levels && width < least_fatness * map.census.membrane) nothing_stands_out();
+  if (width < least_fibre_px)
+    throw Error(Code::BadInput,
+                "fibres in the micrograph are " + number_text(width, 2) +
+                    " pixels wide, which is too few to tell them " + "from noise",
+                "template image", better_image);
   return map;
 } catch (const cv::Exception& e) {
   throw Error(Code::Internal, "image processing failed: " + e.err, "find_fibres");

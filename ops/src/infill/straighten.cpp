@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 namespace fibrolite {
@@ -76,12 +77,19 @@ double sharpest_bend(const Axis& axis, const Shape& inside) {
 }
 
 Axis straightened(const Axis& axis, const Shape& inside) {
-  Axis result = axis;
+  Axis best = axis;
+  double least = sharpest_bend(axis, inside);
   const std::vector<Vec3d>& line = axis.centre_line();
   const auto points = static_cast<double>(line.size());
-  for (double width = points / 64; sharpest_bend(result, inside) > most_bend && width < 4 * points; width *= 1.4)
-    result = Axis::along(smoothed(line, std::max(1.0, width)));
-  return result;
+  // A line between two ends gets straight at last; of a ring, which gets smaller, the best of them.
+  for (double width = points / 64; least > most_bend && width < 4 * points; width *= 1.4) {
+    Axis next = Axis::along(smoothed(line, std::max(1.0, width)));
+    const double bend = sharpest_bend(next, inside);
+    if (bend >= least) continue;
+    best = std::move(next);
+    least = bend;
+  }
+  return best;
 }
 
 }  // namespace fibrolite

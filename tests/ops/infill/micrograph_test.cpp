@@ -146,6 +146,36 @@ TEST(Micrograph, AnImageWithoutStructureIsRefused) {
   EXPECT_TRUE(refused(dome));
 }
 
+/// Grain of laser light: of exponential brightness, its amplitude of Rayleigh's; and noise that has been enlarged.
+TEST(Micrograph, GrainIsNoStructure) {
+  const auto refused = [](const GrayImage& image) {
+    try {
+      (void)find_fibres(image);
+    } catch (const Error& e) {
+      return e.code() == Code::BadInput;
+    }
+    return false;
+  };
+  constexpr int side = 500;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const GrayImage real = pure_noise(seed, side, 128, 25, 6), imaginary = pure_noise(seed + 10, side, 128, 25, 6);
+    GrayImage bright(side, side), amplitude(side, side), enlarged(side, side);
+    Random random(seed, "grain");
+    GrayImage dots(side / 2, side / 2);
+    for (std::uint8_t& p : dots.pixels) p = random.uniform() < 0.3 ? 255 : 20;
+    for (int y = 0; y < side; ++y)
+      for (int x = 0; x < side; ++x) {
+        const double re = real(x, y) - 128, im = imaginary(x, y) - 128, square = re * re + im * im;
+        bright(x, y) = static_cast<std::uint8_t>(std::min(255.0, 0.04 * square));
+        amplitude(x, y) = static_cast<std::uint8_t>(std::min(255.0, 3 * std::sqrt(square)));
+        enlarged(x, y) = dots(x / 2, y / 2);
+      }
+    EXPECT_TRUE(refused(bright)) << seed;
+    EXPECT_TRUE(refused(amplitude)) << seed;
+    EXPECT_TRUE(refused(enlarged)) << seed;
+  }
+}
+
 /// Hexagons of pitch p with walls w: (p - w)^2 sqrt(3) / 2 each.
 TEST(Micrograph, CensusOfAHoneycomb) {
   for (const auto& [columns, rows, pitch, wall] : {std::tuple{14, 12, 24.0, 4.0}, std::tuple{10, 9, 60.0, 20.0}}) {
@@ -161,24 +191,56 @@ TEST(Micrograph, CensusOfAHoneycomb) {
   }
 }
 
+/// As read from a file of that ending.
+GrayImage through_a_file(const cv::Mat& image, const std::string& ending) {
+  const testing::TempDir folder;
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(ending, image, bytes);
+  std::ofstream(folder / ending, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  return read_gray(folder / ending);
+}
+
+/// Every pixel of a gray image made into one of colour.
+template <class Pixel, class Make>
+cv::Mat each_pixel(const GrayImage& gray, int type, const Make& make) {
+  cv::Mat image(gray.height, gray.width, type);
+  for (int y = 0; y < gray.height; ++y)
+    for (int x = 0; x < gray.width; ++x) image.at<Pixel>(y, x) = make(gray(x, y));
+  return image;
+}
+
 TEST(Micrograph, ColourInAnyFormatGivesTheSameFibres) {
   int drawn = 0;
-  const GrayImage gray = photograph(4, 30, 400, 8, &drawn);
-  cv::Mat pink(gray.height, gray.width, CV_8UC3);
-  for (int y = 0; y < gray.height; ++y)
-    for (int x = 0; x < gray.width; ++x) {
-      const int v = gray(x, y);
-      pink.at<cv::Vec3b>(y, x) = {static_cast<std::uint8_t>(v * 2 / 3), static_cast<std::uint8_t>(v / 2),
-                                  static_cast<std::uint8_t>(v)};
-    }
-  const testing::TempDir folder;
-  for (const char* ending : {".png", ".jpg", ".tif"}) {
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(ending, pink, bytes);
-    std::ofstream(folder / ending, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    EXPECT_NEAR(find_fibres(read_gray(folder / ending)).fibres, drawn, 0.04 * drawn) << ending;
-  }
+  const cv::Mat pink = each_pixel<cv::Vec3b>(photograph(4, 30, 400, 8, &drawn), CV_8UC3, [](int v) {
+    return cv::Vec3b(static_cast<std::uint8_t>(v * 2 / 3), static_cast<std::uint8_t>(v / 2),
+                     static_cast<std::uint8_t>(v));
+  });
+  for (const char* ending : {".png", ".jpg", ".tif"})
+    EXPECT_NEAR(find_fibres(through_a_file(pink, ending)).fibres, drawn, 0.04 * drawn) << ending;
+}
+
+/// Red fibres in green of the same luminance; ink that is there or not; numbers of any size.
+TEST(Micrograph, FibresThatStandOutInAnyWayAreFound) {
+  const GrayImage squares = square_fibres(9, 7, 26, 5);
+  const cv::Mat hue = each_pixel<cv::Vec3b>(squares, CV_8UC3, [](int v) {
+    const double share = (v - 60) / 120.0;
+    return cv::Vec3b(60, cv::saturate_cast<std::uint8_t>(141 - 81 * share),
+                     cv::saturate_cast<std::uint8_t>(40 + 160 * share));
+  });
+  const cv::Mat ink =
+      each_pixel<cv::Vec4b>(squares, CV_8UC4, [](int v) { return cv::Vec4b(0, 0, 0, static_cast<std::uint8_t>(v)); });
+  const cv::Mat numbers = each_pixel<float>(squares, CV_32F, [](int v) { return static_cast<float>(1e-3 * v - 0.05); });
+  const cv::Mat deep = each_pixel<std::uint16_t>(squares, CV_16U, [](int v) { return static_cast<std::uint16_t>(v); });
+  EXPECT_EQ(find_fibres(through_a_file(hue, ".png")).fibres, 63);
+  EXPECT_EQ(find_fibres(through_a_file(ink, ".png")).fibres, 63);
+  EXPECT_EQ(find_fibres(through_a_file(numbers, ".tif")).fibres, 63);
+  EXPECT_EQ(find_fibres(through_a_file(deep, ".png")).fibres, 63);
+  // Gray stays what it is, in one channel or in three alike.
+  const GrayImage photo = photograph(4, 30, 400);
+  const cv::Mat three =
+      each_pixel<cv::Vec3b>(photo, CV_8UC3, [](int v) { return cv::Vec3b::all(static_cast<std::uint8_t>(v)); });
+  EXPECT_EQ(through_a_file(three, ".png").pixels, photo.pixels);
 }
 
 TEST(Micrograph, AFileThatIsNoImageIsRefused) {

@@ -69,18 +69,38 @@ TEST(Straighten, AnElbowTooSharpForItsLimbIsRounded) {
   EXPECT_LT(norm(round.centre_line().back() - line.back()), 1e-6);
 }
 
+/// Smoothing would make a ring smaller, and its bend sharper.
+TEST(Straighten, AFatRingIsMadeNoTighter) {
+  std::vector<Vec3d> line;
+  for (int i = 0; i <= 96; ++i) line.push_back({10 * std::cos(pi * i / 48), 10 * std::sin(pi * i / 48), 0});
+  line.back() = line.front();
+  const Axis ring = Axis::along(line);
+  const Shape limb = torus({}, 10, 9.2);
+  const double before = sharpest_bend(ring, limb);
+  ASSERT_GT(before, 0.8);
+  const Axis after = straightened(ring, limb);
+  EXPECT_LE(sharpest_bend(after, limb), before);
+  EXPECT_GT(planes_in_order(after, limb, "ring"), 80);
+}
+
 /// Of limbs as they are found.
 TEST(Straighten, PlanesDoNotCrossInsideTheLimbsOfModels) {
+  std::vector<std::pair<std::string, std::filesystem::path>> models;
+  for (const char* name : {"bent_tube", "figure", "quadruped"}) models.emplace_back(name, testing::asset(name));
+  for (const char* file : {"horse.ply", "hand.obj", "armadillo.obj", "fertility.off"})
+    if (const auto path = testing::shared_model(file)) models.emplace_back(file, *path);
   int planes = 0;
-  for (const char* name : {"bent_tube", "figure"}) {
-    const Proxy proxy = make_proxy(read_mesh(testing::asset(name)).mesh, {.triangles = 8000});
+  for (const auto& [name, path] : models) {
+    const Proxy proxy = make_proxy(read_mesh(path).mesh, {.triangles = 8000});
     const Partition found = partition(proxy, diameter(proxy.surface));
     const Shape body = distance_to(proxy.solid);
     for (const Candidate& limb : found.candidates) {
       if (!limb.column_like) continue;
       const Shape inside = intersect({body, found.labels.region(limb.id)});
-      planes += planes_in_order(straightened(limb.axis, inside), inside,
-                                std::string(name).append(" ") + std::to_string(limb.id));
+      const Axis axis = straightened(limb.axis, inside);
+      const std::string which = name + " " + std::to_string(limb.id);
+      EXPECT_LE(sharpest_bend(axis, inside), 0.8) << which;
+      planes += planes_in_order(axis, inside, which);
     }
   }
   EXPECT_GT(planes, 200);

@@ -19,8 +19,8 @@ struct FibreMap {
   FibreCensus census{};      ///< px
 };
 /// Segment fibres by watershed (bright fibres, dark membranes, or the reverse: decided by which side is compact).
-/// Uneven light is evened out. @throws Error BadInput: nothing stands out (an even image, noise), or fewer than 4
-/// fibres found.
+/// Uneven light is evened out. @throws Error BadInput: nothing stands out (an even image, noise), fewer than 4
+/// fibres found, or fibres less than 6 pixels wide.
 [[nodiscard]] FibreMap find_fibres(const GrayImage& micrograph);
 
 /// Tile-free texture of fibres, larger than the template, by image quilting (Efros & Freeman 2001), rescaled so that
@@ -56,7 +56,8 @@ struct MembraneParams {
 /// TooLarge, BadInput (a map without fibres). Cost: O(pixels), parallel.
 [[nodiscard]] MembraneImage synthesize(const FibreMap& map, const MembraneParams& params);
 
-/// 8-bit gray image from a .png, .jpg, .tif, .bmp file. @throws Error BadInput.
+/// 8-bit gray image from a .png, .jpg, .tif, .bmp file: of colours the mix in which most stands out, of deeper values
+/// all from the lowest to the highest. @throws Error BadInput.
 [[nodiscard]] GrayImage read_gray(const std::filesystem::path& path);
 /// 8-bit PNG, whole or absent. @throws Error Io.
 void write_gray(const std::filesystem::path& path, const GrayImage& image);
