@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 
 #include "fibrolite/pieces.h"
 #include "fibrolite/random.h"
@@ -279,20 +280,23 @@ std::vector<Overrides::Plane> planes_for(int pieces, Vec3d size, Random& random)
   return {};
 }
 
-// Whatever planes part a box into two to eight, and whatever fills the parts: one piece, joined at every border.
-class RandomParts : public ::testing::TestWithParam<int> {};
+// Whatever planes part a box into two to eight, and whatever fills the parts, in each form of crystal: one piece,
+// joined at every border.
+class RandomParts : public ::testing::TestWithParam<std::tuple<int, int>> {};
 
 TEST_P(RandomParts, OfABoxAreAlwaysOnePiece) {
-  const int wanted = GetParam();
+  const auto [wanted, seed] = GetParam();
   const Vec3d size{36, 30, 26};
-  Random random(static_cast<std::uint64_t>(wanted), "planes", 1);
+  Random random(static_cast<std::uint64_t>(wanted), "planes", static_cast<std::uint64_t>(seed));
   Recipe recipe = sturdy();
   recipe.seed = static_cast<std::uint64_t>(wanted);
+  recipe.tcs.form = static_cast<TcsForm>(seed % 3);
+  recipe.tcs.wall_mm = recipe.gyroid.wall_mm = 1.2;
   recipe.verify.triangles = 1000;  // what fills a part is given, not decided by its stresses
   recipe.partition.overrides.cuts = planes_for(wanted, size, random);
   ASSERT_FALSE(recipe.partition.overrides.cuts.empty());
   for (int id = 0; id < wanted; ++id)
-    recipe.partition.overrides.parts.push_back({id, static_cast<PartInfill>(random.below(3))});
+    recipe.partition.overrides.parts.push_back({id, static_cast<PartInfill>(random.below(4))});
   const Report report = hybridized(block(size), {.recipe = recipe, .voxel_mm = 0.5}).report;
   EXPECT_EQ(static_cast<int>(report.parts.size()), wanted);
   EXPECT_EQ(report.solid.pieces, 1);
@@ -305,7 +309,7 @@ TEST_P(RandomParts, OfABoxAreAlwaysOnePiece) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(TwoToEight, RandomParts, ::testing::Range(2, 9));
+INSTANTIATE_TEST_SUITE_P(TwoToEight, RandomParts, ::testing::Combine(::testing::Range(2, 9), ::testing::Range(1, 4)));
 
 /// Bowls that open to either side cross each other and a plane.
 TEST(Overrides, BowlsThatCrossAreJoinedAtEveryBorder) {
