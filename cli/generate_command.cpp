@@ -11,6 +11,7 @@
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
+#include "fibrolite/to_solid.h"
 #include "job.h"
 #include "options.h"
 #include "run.h"
@@ -43,6 +44,11 @@ struct GenerateOptions {
     if (fix) return "--fix";
     return made_by.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "";
   }
+  [[nodiscard]] Extras extras(const Recipe& made_by) const {
+    return {.mends = fix || made_by.print.drain_mm.value_or(0) > 0,
+            .pictures = !pictures.files.empty(),
+            .steps = steps.has_value()};
+  }
   /// What may be written besides the outputs and their report.
   [[nodiscard]] std::vector<fs::path> more_files() const {
     std::vector<fs::path> all = pictures.files;
@@ -54,13 +60,21 @@ struct GenerateOptions {
 /// Of a file: what its format takes for a triangle and half a vertex, or a voxel; compressed files as measured.
 double expected_bytes(const fs::path& file, const Prediction& expected) {
   const std::string ending = file.extension().string();
-  if (is_vdb(file)) return 2.8 * expected.active_voxels;
-  const double triangle = ending == ".ply" ? 19 : ending == ".obj" ? 48 : ending == ".3mf" ? 14 : 50;
+  if (is_vdb(file)) return 3.3 * expected.active_voxels;
+  const double triangle = ending == ".ply"                       ? 19
+                          : ending == ".obj" || ending == ".off" ? 39
+                          : ending == ".3mf"                     ? 14
+                                                                 : 50;
   return triangle * expected.triangles;
 }
 
-/// How much less it takes on some threads than on one.
-double shared_among(int threads) { return 1 + 0.65 * (threads - 1); }
+/// Of the processor, as measured.
+double expected_s(const fs::path& file, const Prediction& expected) {
+  const std::string ending = file.extension().string();
+  if (is_vdb(file)) return 40e-9 * expected.active_voxels;
+  const double triangle = ending == ".obj" ? 150e-9 : ending == ".off" ? 120e-9 : ending == ".3mf" ? 620e-9 : 62e-9;
+  return triangle * expected.triangles;
+}
 
 std::string plan(const GenerateOptions& options, const Model& model, const HybridizeParams& params,
                  const fs::path& report) {
@@ -70,16 +84,20 @@ std::string plan(const GenerateOptions& options, const Model& model, const Hybri
                      " mm\n";
   text += "infill    " + std::string(name_of(options.recipe.infill())) + "\n";
   text += "voxel     " + number_text(*params.voxel_mm) + " mm\n";
-  const Prediction expected = predict(model.mesh, *params.voxel_mm, params.recipe, params.infill);
+  Extras extras = options.extras(params.recipe);
+  extras.open = is_open(model.mesh);
+  const Prediction expected = predict(model.mesh, *params.voxel_mm, params.recipe, params.infill, extras);
   text += "solid     about " + number_text(expected.active_voxels / 1e6, 2) + " million voxels, a mesh of " +
           number_text(expected.triangles / 1e6, 2) + " million triangles\n";
-  text += "memory    about " + memory_text(params.slabs ? params.slabs->memory_bytes : expected.memory_bytes) + " of ";
+  const double memory = params.slabs ? params.slabs->usual_bytes : expected.memory_bytes;
+  text += "memory    about " + memory_text(memory) + " of ";
   text += memory_text(options.run.allowed_bytes());
   if (params.slabs) text += ", in " + std::to_string(params.slabs->borders.size() - 1) + " slabs";
   text += "\n";
-  const double cpu_s = machine_times() * (expected.cpu_s + (params.slabs ? expected.slabs_s : 0));
-  text += "time      about " + number_text(cpu_s / shared_among(ThreadLimit::count()), 2) + " s, " +
-          number_text(cpu_s, 2) + " s of CPU, and what the disk takes\n";
+  double cpu_s = expected.cpu_s + (params.slabs ? expected.slabs_s : 0);
+  for (const fs::path& file : options.output.files) cpu_s += expected_s(file, expected);
+  cpu_s *= machine_times();
+  text += time_text(cpu_s);
   for (const fs::path& file : options.output.files)
     text += "output    " + file.string() + ", about " + memory_text(expected_bytes(file, expected)) + "\n";
   text += "output    " + report.string() + "\n";
@@ -148,7 +166,8 @@ void generate(const GenerateOptions& options) {
   params.slabs = fit_into_memory(
       model.mesh, *params.voxel_mm, params.recipe, options.recipe.infill(), options.run,
       [&](double voxel_mm) { return SlabNeeds{.axis = axis, .margin_mm = 8 * voxel_mm, .surface = true}; }, 0,
-      options.needs_whole(params.recipe));
+      options.needs_whole(params.recipe), options.extras(params.recipe));
+  params.most_bytes = options.run.allowed_bytes();
   if (options.run.dry_run) return print(plan(options, model, params, job.report_path));
 
   // Each thing goes as soon as nothing needs it: at the end only the surface and its check are in memory.

@@ -13,6 +13,7 @@
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
 #include "fibrolite/surface.h"
+#include "fibrolite/to_solid.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -69,8 +70,8 @@ namespace {
   if (needed(fitting) <= allowed)
     remedy += "use --voxel " + number_text(fitting) + (fitting < most ? " or larger" : "") + ", or raise --max-memory";
   else if (fitting == most && needed(most) < 1e18)
-    remedy += "raise --max-memory to " + memory_option(needed(most)) +
-              (voxel_mm < most ? " and use --voxel " + number_text(most) : "") +
+    remedy += "raise --max-memory to " + memory_option(needed(voxel_mm)) +
+              (voxel_mm < most ? " (" + memory_option(needed(most)) + " with --voxel " + number_text(most) + ")" : "") +
               ", use a smaller --size, or a recipe of thicker members";
   else
     remedy += "raise --max-memory";
@@ -80,21 +81,30 @@ namespace {
 }  // namespace
 
 void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const RunOptions& run) {
-  const auto needed = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes; };
+  const Extras extras{.open = is_open(model)};
+  const auto needed = [&](double voxel) { return most_memory(model, voxel, recipe, infill, extras); };
   if (!(needed(voxel_mm) <= run.allowed_bytes()))
     refuse(model, voxel_mm, most_voxel_mm(recipe, infill), needed, run.allowed_bytes(), "");
 }
 
 std::optional<SlabPlan> fit_into_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill,
                                         const RunOptions& run, const std::function<SlabNeeds(double)>& needs,
-                                        double more_bytes, const std::string& whole) {
+                                        double more_bytes, const std::string& whole, Extras extras) {
   const double allowed = run.allowed_bytes(), most = most_voxel_mm(recipe, infill);
-  const auto as_whole = [&](double voxel) { return predict(model, voxel, recipe, infill).memory_bytes + more_bytes; };
+  extras.open = is_open(model);
+  const auto as_whole = [&](double voxel) { return most_memory(model, voxel, recipe, infill, extras) + more_bytes; };
   if (as_whole(voxel_mm) <= allowed) return std::nullopt;
   if (!whole.empty())
     refuse(model, voxel_mm, most, as_whole, allowed, ", and " + whole + " needs the whole solid in it");
   const auto plan_of = [&](double voxel) {
-    return plan_slabs(model, voxel, recipe, infill, needs(voxel), allowed - more_bytes);
+    SlabPlan plan = plan_slabs(model, voxel, recipe, infill, needs(voxel), allowed - more_bytes);
+    // An open mesh is closed all at once, before there are slabs.
+    if (extras.open) {
+      const double mending = most_memory(model, voxel, recipe, InfillKind::Solid) + repair_bytes(model, voxel);
+      plan.memory_bytes = std::max(plan.memory_bytes, mending);
+      plan.usual_bytes = std::max(plan.usual_bytes, 0.9 * mending);
+    }
+    return plan;
   };
   SlabPlan plan = plan_of(voxel_mm);
   if (plan.memory_bytes + more_bytes > allowed) {
@@ -122,6 +132,12 @@ void write_text(const std::filesystem::path& path, const std::string& text) {
   OutputFile file(path);
   file.write(text);
   file.commit();
+}
+
+std::string time_text(double cpu_s) {
+  const double shared = 1 + 0.65 * (ThreadLimit::count() - 1);  // how much less it takes than on one thread
+  return "time      about " + number_text(cpu_s / shared, 2) + " s, " + number_text(cpu_s, 2) +
+         " s of CPU, and what the disk takes\n";
 }
 
 std::string memory_text(double bytes) {

@@ -26,12 +26,13 @@ void check_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, Infi
 
 /// Slab by slab, if the run would need more memory than it may use as a whole. `needs`: of slabs, by voxel.
 /// `more_bytes`: taken beside the solid.
-/// `whole`: what asks for all of it in memory; empty if nothing does.
+/// `whole`: what asks for all of it in memory; empty if nothing does. `extras`: what the run does besides; whether the
+/// mesh is open is found out.
 /// @throws Error TooLarge, before anything is allocated, if it does not fit either way.
 [[nodiscard]] std::optional<SlabPlan> fit_into_memory(const Mesh& model, double voxel_mm, const Recipe& recipe,
                                                       InfillKind infill, const RunOptions& run,
                                                       const std::function<SlabNeeds(double)>& needs, double more_bytes,
-                                                      const std::string& whole);
+                                                      const std::string& whole, Extras extras = {});
 
 /// What decides by shape: proxy, diameter and partition as stages of the report, seen as the model stands under its
 /// load (proxy.frame); to be placed in the world.
@@ -43,6 +44,9 @@ struct FoundParts {
 
 /// Whole or absent. @throws Error Io.
 void write_text(const std::filesystem::path& path, const std::string& text);
+
+/// "time      about ...": on this many threads, and of the processor.
+[[nodiscard]] std::string time_text(double cpu_s);
 
 /// "1.5 GB", steps of 1024.
 [[nodiscard]] std::string memory_text(double bytes);

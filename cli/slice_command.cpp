@@ -12,6 +12,7 @@
 #include "fibrolite/ops/hybridize.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/solid_io.h"
+#include "fibrolite/to_solid.h"
 #include "job.h"
 #include "options.h"
 #include "resume.h"
@@ -37,9 +38,13 @@ struct SliceOptions {
 };
 
 /// What is cut into layers. Of a model it is only known how large it is until fill() has made it.
+constexpr double process_bytes = 50e6;  // of a program that has begun
+
 struct Source {
   Box3d box;                      // in the frame of the print
-  double area_mm2 = 0;            // of its surfaces, roughly: what the size of a file depends on
+  double area_mm2 = 0;            // of its surfaces: what the size of a file depends on
+  double curls = 1.3;             // how many more points its contours have than smooth walls, at a pixel
+  Prediction expected;            // of a model
   double memory = 0;              // to make it, bytes
   std::optional<SlabPlan> slabs;  // if it does not fit into memory as a whole
   Shape shape;
@@ -119,20 +124,20 @@ std::function<LayerRun(const SlicePlate&, int)> from_slabs(SolidStream stream, c
   };
 }
 
-/// Bytes for each pixel that a surface runs through, measured on horses full of crystal and hybrid.
-double bytes_a_cut(SliceFormat format) {
+/// Bytes for each pixel that a surface runs through, measured on seven solids, of smooth walls.
+double bytes_a_cut(SliceFormat format, double curls) {
   switch (format) {
     case SliceFormat::PngZip:
     case SliceFormat::Sl1:
-      return 3.6;
+      return 2.3;
     case SliceFormat::SvgZip:
-      return 6;
+      return 2.65 * curls;
     case SliceFormat::Svg:
-      return 17;
+      return 7.3 * curls;
     case SliceFormat::Cli:
-      return 15;
+      return 6.4 * curls;
     case SliceFormat::ThreeMf:
-      return 9;
+      return 4.7 * curls;
   }
   return 0;
 }
@@ -142,17 +147,28 @@ double bytes_a_pixel(SliceFormat format) {
   return format == SliceFormat::PngZip || format == SliceFormat::Sl1 ? 1.0 / 1000 : 0;
 }
 
-/// Within 30 % of what is written, for pictures of a horse 100 to 300 mm long.
-double expected_bytes(const fs::path& file, const std::vector<SlicePlate>& plates, double area_mm2) {
+/// Contours of round sticks turn more than those of walls.
+double curls_of(const Recipe& recipe, InfillKind infill) {
+  if (infill == InfillKind::Hybrid) return 1.3;
+  return infill == InfillKind::Tcs && recipe.tcs.form != TcsForm::Sheet ? 1.65 : 1;
+}
+
+/// Pixels that a surface runs through, in all layers.
+double cuts_of(const std::vector<SlicePlate>& plates, double area_mm2) {
   const SliceGrid& grid = plates.front().grid;
+  return area_mm2 / (grid.layer_mm * std::sqrt(grid.pixel_mm.x * grid.pixel_mm.y));
+}
+
+/// Within some 30 % of what is written.
+double expected_bytes(const fs::path& file, const std::vector<SlicePlate>& plates, const Source& source) {
   const SliceFormat format = slice_format(file);
   double layers = 0, pixels = 0;
   for (const SlicePlate& plate : plates) {
     layers += plate.grid.layers;
     pixels += 1.0 * plate.grid.layers * plate.grid.width * plate.grid.height;
   }
-  const double pixel_mm = std::sqrt(grid.pixel_mm.x * grid.pixel_mm.y);
-  return 1000 * layers + bytes_a_pixel(format) * pixels + bytes_a_cut(format) * area_mm2 / (grid.layer_mm * pixel_mm);
+  return 1000 * layers + bytes_a_pixel(format) * pixels +
+         bytes_a_cut(format, source.curls) * cuts_of(plates, source.area_mm2);
 }
 
 /// What is known of the plates before they are sliced.
@@ -169,14 +185,21 @@ std::string plan(const SliceOptions& options, const Source& source, const std::v
   const Vec3d size = source.box.size();
   std::string text = "model     " + options.model.path.string() + ", ";
   text += number_text(size.x) + " x " + number_text(size.y) + " x " + number_text(size.z) + " mm\n";
-  text += layers_text(described(plates)) + "memory    about ";
-  text += memory_text(source.memory + slicing_memory(plates.front().grid)) + " of ";
+  text += layers_text(described(plates));
+  if (!options.from_solid())
+    text += "solid     about " + number_text(source.expected.active_voxels / 1e6, 2) + " million voxels\n";
+  text += "memory    about ";
+  // Half of the layers that may wait do.
+  text += memory_text(source.memory + 0.5 * slicing_memory(plates.front().grid)) + " of ";
   text += memory_text(options.run.allowed_bytes());
   if (source.slabs) text += ", in " + std::to_string(source.slabs->borders.size() - 1) + " slabs";
   text += "\n";
+  constexpr double layers_s = 1.4e-6;  // a cut, in each file; half or twice that
+  const double cuts_s = layers_s * cuts_of(plates, source.area_mm2) * static_cast<double>(options.output.files.size());
+  const double solid_s = source.expected.solid_s + (source.slabs ? source.expected.slabs_s : 0);
+  text += time_text(machine_times() * (solid_s + cuts_s));
   for (const fs::path& file : options.output.files)
-    text +=
-        "output    " + file.string() + ", about " + memory_text(expected_bytes(file, plates, source.area_mm2)) + "\n";
+    text += "output    " + file.string() + ", about " + memory_text(expected_bytes(file, plates, source)) + "\n";
   return text + "dry run: nothing was written\n";
 }
 
@@ -236,7 +259,7 @@ void slice_to_files(const SliceOptions& options) {
       source.box = fibrolite::bounds_in(frame, solid);
       source.shape = smooth_distance_to(solid);
       source.volume_mm3 = solid.volume_mm3();
-      source.memory = static_cast<double>(solid.memory_bytes());
+      source.memory = process_bytes + static_cast<double>(solid.memory_bytes());
       // A band of six voxels about the surface.
       source.area_mm2 = static_cast<double>(solid.active_voxels()) * std::pow(solid.grid().voxel_mm, 2) / 6;
       report.solid.active_voxels = solid.active_voxels();
@@ -251,9 +274,6 @@ void slice_to_files(const SliceOptions& options) {
     params.voxel_mm = choose_voxel(bounds(model.mesh), params.recipe, options.recipe.infill(), options.voxel_mm);
     check_recipe(params.recipe, *params.voxel_mm, options.recipe.infill());
     source.box = bounds_in(frame, model.mesh);
-    const double thinnest = thinnest_mm(params.recipe, options.recipe.infill());
-    source.area_mm2 = 2 * area(model.mesh);
-    if (std::isfinite(thinnest)) source.area_mm2 += 0.16 * std::abs(signed_volume(model.mesh)) / thinnest;
   }
   const std::vector<SlicePlate> plates =
       make_plates(frame, source.box,
@@ -261,14 +281,22 @@ void slice_to_files(const SliceOptions& options) {
   check_steps(plates.front().grid, source.box.size());
   check_plates(options, plates, source.memory);
   if (!options.from_solid()) {
+    const bool drains = params.recipe.print.drain_mm.value_or(0) > 0;
+    Extras extras{.mends = drains};
     params.slabs = fit_into_memory(
         model.mesh, *params.voxel_mm, params.recipe, options.recipe.infill(), options.run,
         [&](double voxel_mm) { return needs_of_layers(options.model.up, options.layer_mm.value_or(0.05), voxel_mm); },
-        slicing_memory(plates.front().grid), params.recipe.print.drain_mm.value_or(0) > 0 ? "print.drain_mm" : "");
+        slicing_memory(plates.front().grid), drains ? "print.drain_mm" : "", extras);
+    params.most_bytes = options.run.allowed_bytes();
     source.slabs = params.slabs;
-    source.memory = params.slabs
-                        ? params.slabs->memory_bytes
-                        : predict(model.mesh, *params.voxel_mm, params.recipe, options.recipe.infill()).memory_bytes;
+    if (options.run.dry_run) {
+      extras.open = is_open(model.mesh);
+      const Prediction expected = predict(model.mesh, *params.voxel_mm, params.recipe, params.infill, extras);
+      source.memory = params.slabs ? params.slabs->usual_bytes : expected.sliced_memory_bytes;
+      source.area_mm2 = expected.faces_mm2;
+      source.curls = curls_of(params.recipe, params.infill);
+      source.expected = expected;
+    }
   }
   if (options.run.dry_run) return print(plan(options, source, plates));
 

@@ -56,9 +56,9 @@ void print_comparison(const json& now, const json& then, const std::string& comm
   for (const json& row : now.at("cases")) {
     const json* old = find(then.at("cases"), row.at("name"));
     if (old == nullptr || !measured(row) || !measured(*old)) continue;
+    if (!row.contains("stages") || !old->contains("stages")) continue;
     std::printf("%s\n", row.at("name").get<std::string>().c_str());
     const double unit = row["floor"]["compute_cpu_s"], old_unit = (*old)["floor"]["compute_cpu_s"];
-    if (!row.contains("stages") || !old->contains("stages")) continue;
     for (const json& stage : row.at("stages")) {
       const json* was = find(old->at("stages"), stage.at("name"));
       if (was == nullptr) continue;

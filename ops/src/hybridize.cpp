@@ -93,8 +93,10 @@ Hybrid hybridize(const Model& model, const HybridizeParams& params, Report& repo
     return out;
   }
   const Solid body = run("body", 0.60, [&](const Context& c) {
-    const ToSolidParams wanted{
-        .grid = grid, .inside_band_mm = depth_for_shell(shell_mm, voxel), .tree = std::move(model_tree)};
+    const ToSolidParams wanted{.grid = grid,
+                               .inside_band_mm = depth_for_shell(shell_mm, voxel),
+                               .tree = std::move(model_tree),
+                               .most_bytes = params.most_bytes};
     ToSolidResult made = to_solid(model.mesh, wanted, c);
     report.model.repairs.insert(report.model.repairs.end(), made.repairs.begin(), made.repairs.end());
     return made.solid;

@@ -11,6 +11,8 @@
 #include "fibrolite/ops/infill/tcs.h"
 #include "fibrolite/ops/solid_stream.h"
 #include "fibrolite/reach.h"
+#include "fibrolite/to_solid.h"
+#include "survey.h"
 
 namespace fibrolite {
 
@@ -46,12 +48,15 @@ double sticks_a_mm3(const TcsParams& t, double cell) {
   return (16 * stick + 8 * knob) / (cell * cell * cell);
 }
 
+double tcs_a_mm3(const TcsParams& t) {
+  const double cell = t.cell_mm.least();
+  return t.form == TcsForm::Sticks ? sticks_a_mm3(t, cell) : (t.form == TcsForm::Sheet ? 2 : 1) * 3.84 / cell;
+}
+double mfs_a_mm3(const MfsParams& m) { return 2.4 / m.fibre_mm; }
+
 Density density(double h, const Recipe& recipe, InfillKind infill) {
   const TcsParams t = sized(recipe.tcs);
-  const double cell = t.cell_mm.least();
-  const double tcs =
-      t.form == TcsForm::Sticks ? sticks_a_mm3(t, cell) : (t.form == TcsForm::Sheet ? 2 : 1) * 3.84 / cell;
-  const double mfs = 2.4 / recipe.mfs.fibre_mm;
+  const double tcs = tcs_a_mm3(t), mfs = mfs_a_mm3(recipe.mfs);
   const auto per_mm3_of = [&] {
     switch (infill) {
       case InfillKind::Solid:
@@ -97,7 +102,9 @@ constexpr double slab_times = 1.35;
 
 double fixed_bytes(const Mesh& model) { return 50e6 + 300.0 * static_cast<double>(model.triangles.size()); }
 /// Of the proxy's finite elements, before there is a voxel.
-double deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 240e6 : 0; }
+double deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 270e6 : 0; }
+
+double usual_deciding_bytes(InfillKind infill) { return infill == InfillKind::Hybrid ? 215e6 : 0; }
 
 /// Of what is known along sticks while they are swept (StickSweep): 16 to a cell, and eight nodes.
 double sticks_bytes(const Mesh& model, const Recipe& recipe, InfillKind infill) {
@@ -150,24 +157,55 @@ Profile profile(const Mesh& model, double voxel_mm, int axis) {
 
 }  // namespace
 
-Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill) {
+double most_memory(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const Extras& extras) {
   const double surface_mm2 = area(model), volume_mm3 = std::abs(signed_volume(model));
   const Density d = density(voxel_mm, recipe, infill);
   const double faces_mm2 = d.faces_a_mm2 * surface_mm2 + d.faces_a_mm3 * volume_mm3;
   const double solid = bytes_a_sample * d.samples_a_face_mm2 * faces_mm2;
   const double body = bytes_a_sample * d.body(surface_mm2, volume_mm3);
-  Prediction result;
-  result.active_voxels = d.active_a_face_mm2 * faces_mm2;
-  result.triangles = d.triangles_a_face_mm2 * faces_mm2;
+  const double active = d.active_a_face_mm2 * faces_mm2, triangles = d.triangles_a_face_mm2 * faces_mm2;
   // The body is gone when the surface is made, which takes twenty bytes a triangle.
-  const double voxels = body_times * body + solid_times * solid, mesh = solid + 20 * result.triangles;
-  result.memory_bytes = fixed_bytes(model) + std::max({safety * voxels, safety * mesh, deciding_bytes(infill)});
-  // Measured on one thread: of the body per sample; of the solid per voxel of the band; of the mesh per triangle.
-  const double deciding_s = infill == InfillKind::Hybrid ? 8 : 0, body_s = 46e-9 * body / bytes_a_sample;
-  const double solid_s = (recipe.print.check ? 120e-9 : 45e-9) * result.active_voxels;
-  const double model_s = 0.2 + 5e-6 * static_cast<double>(model.triangles.size());
-  result.cpu_s = model_s + deciding_s + body_s + solid_s + 245e-9 * result.triangles;
-  result.slabs_s = model_s + body_s + 0.8 * solid_s;
+  const double voxels = body_times * body + solid_times * solid, mesh = solid + 20 * triangles;
+  double most = std::max({safety * voxels, safety * mesh, deciding_bytes(infill)});
+  if (extras.mends) most = std::max(most, 100 * active);
+  if (extras.steps) most = std::max(most, 75 * active);
+  if (extras.pictures) most = std::max(most, 185 * triangles);
+  if (extras.open) most = std::max(most, repair_bytes(model, voxel_mm));
+  return fixed_bytes(model) + most;
+}
+
+Prediction predict(const Mesh& model, double voxel_mm, const Recipe& recipe, InfillKind infill, const Extras& extras) {
+  // Fibres have so much more surface than the crystal that stands for them; in a hybrid limbs make that up.
+  const TcsParams tcs = sized(recipe.tcs);
+  const double fibres = infill != InfillKind::Mfs ? 1 : 0.92 * mfs_a_mm3(recipe.mfs) / tcs_a_mm3(tcs);
+  const Survey found = survey(model, voxel_mm, recipe, infill, fibres);
+  constexpr double bytes_a_block = 2100;
+  const auto faces = static_cast<double>(model.triangles.size());
+  const double body = bytes_a_block * found.body_blocks, solid = bytes_a_block * found.blocks;
+  const double open_faces = extras.open ? area(model) / (voxel_mm * voxel_mm) : 0;
+  Prediction result;
+  result.active_voxels = found.active;
+  result.triangles = 2 * found.crossings;
+  result.faces_mm2 = found.crossings * voxel_mm * voxel_mm / 1.5;
+  // All from here on fitted to some forty runs on two threads.
+  const double until_solid = 0.9 * body + std::max(15 * found.active, solid);
+  double least = std::max(usual_deciding_bytes(infill), 1000 * open_faces);
+  if (extras.mends) least = std::max(least, 82 * found.active);
+  if (extras.steps) least = std::max(least, 62 * found.active);
+  result.sliced_memory_bytes = fixed_bytes(model) + std::max(least, until_solid);
+  if (extras.pictures) least = std::max(least, 165 * result.triangles);
+  result.memory_bytes =
+      fixed_bytes(model) + std::max({least, until_solid, 0.9 * body + 0.08 * solid + 32 * result.triangles});
+
+  const double deciding_s = infill == InfillKind::Hybrid ? 7.3 : infill == InfillKind::Mfs ? 1.1 : 0;
+  const double body_s = 2.9e-6 * faces + 5e-9 * body + 14e-6 * open_faces;
+  const double solid_s = (infill == InfillKind::Hybrid ? 50e-9 : 30e-9) * found.active;
+  const double check_s = (recipe.print.check ? 75e-9 : 0) * found.active;
+  result.solid_s = 0.15 + 0.65e-6 * faces + deciding_s + body_s + solid_s + check_s;
+  if (extras.mends) result.solid_s += 0.8e-6 * found.active;
+  if (extras.steps) result.solid_s += 0.25e-6 * found.active;
+  result.cpu_s = result.solid_s + (extras.pictures ? 1e-6 : 125e-9) * result.triangles;
+  result.slabs_s = body_s + 1.5 * solid_s;
   return result;
 }
 
@@ -204,7 +242,7 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
   const Profile p = profile(model, voxel_mm, needs.axis);
   const Density d = density(voxel_mm, recipe, infill);
   const auto count = static_cast<int>(p.area_mm2.size());
-  SlabPlan plan{.axis = needs.axis};
+  SlabPlan plan{.axis = needs.axis, .allowed_bytes = allowed_bytes};
   // The print checks look through walls and gaps up to their limits, and some voxels on.
   const PrintParams& limits = recipe.print;
   const double checked_mm = limits.check ? std::max(limits.wall_mm, limits.gap_mm) + 5 * voxel_mm : 0;
@@ -234,6 +272,8 @@ SlabPlan plan_slabs(const Mesh& model, double voxel_mm, const Recipe& recipe, In
     plan.borders.push_back(8 * (p.first + to));
     from = to;
   }
+  const double decided = fixed_bytes(model) + usual_deciding_bytes(infill);
+  plan.usual_bytes = std::max(decided, plan.memory_bytes / 1.4);
   return plan;
 }
 

@@ -20,6 +20,7 @@
 #include "fibrolite/error.h"
 #include "fibrolite/ops/loads.h"
 #include "fibrolite/ops/text.h"
+#include "fibrolite/to_solid.h"
 
 namespace fibrolite {
 namespace {
@@ -81,7 +82,8 @@ Slicer::Slicer(const MeshFile& model, const SlicerParams& params, const Context&
   filled->slice = params.slice;
   check(params.slice);
   check_recipe(fill.recipe, *fill.voxel_mm, fill.infill);
-  if (const double needed = predict(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill).memory_bytes;
+  if (const double needed =
+          most_memory(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill, {.open = is_open(prepared.mesh)});
       needed > params.max_memory_bytes) {
     fill.slabs = plan_slabs(prepared.mesh, *fill.voxel_mm, fill.recipe, fill.infill,
                             needs_of_layers(params.up, params.layer_mm, *fill.voxel_mm), params.max_memory_bytes);

@@ -32,7 +32,10 @@ struct SolidStream::Impl {
         plan(std::move(p)),
         grid(g),
         kept(std::move(k)),
-        voxels(model, {.grid = grid, .inside_band_mm = depth_for_shell(design.assembly.shell_mm, grid.voxel_mm)},
+        voxels(model,
+               {.grid = grid,
+                .inside_band_mm = depth_for_shell(design.assembly.shell_mm, grid.voxel_mm),
+                .most_bytes = plan.allowed_bytes},
                context) {
     for (const Part& part : design.parts.parts) regions.push_back(part.region());
     sticks = sticks_of(design.parts, design.fills);

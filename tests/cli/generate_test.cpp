@@ -171,7 +171,7 @@ TEST(Generate, LessMemoryTiesAndRemovesTheSameStickEnds) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return run(arguments);
   };
-  const std::string memory = "290M";
+  const std::string memory = "320M";
   EXPECT_THAT(generated(slabs, {"--max-memory", memory, "--dry-run"}).out, HasSubstr("slabs"));
   generated(whole, {});
   generated(slabs, {"--max-memory", memory});
@@ -194,6 +194,71 @@ TEST(Generate, APresetBringsItsInfillUnlessOneIsNamed) {
   EXPECT_THAT(plan({}), HasSubstr("infill    hybrid"));
   EXPECT_THAT(plan({"--preset", "peer-tcs"}), HasSubstr("infill    tcs"));
   EXPECT_THAT(plan({"--infill", "mfs", "--preset", "peer-tcs"}), HasSubstr("infill    mfs"));
+}
+
+/// What is said of a run that is not made, and what it took.
+struct Foretold {
+  double voxels = 0, triangles = 0, bytes = 0;  ///< Millions; of the output.
+};
+Foretold foretold(const std::string& text) {
+  const auto after = [&](const std::string& words) {
+    const std::size_t at = text.find(words);
+    EXPECT_NE(at, std::string::npos) << words << text;
+    return text.substr(at + words.size());
+  };
+  const std::string size = after(".stl, about ");
+  const double unit = size.find("KB") < size.find("MB") ? 1024 : 1024 * 1024;
+  return {std::stod(after("solid     about ")), std::stod(after("voxels, a mesh of ")), std::stod(size) * unit};
+}
+
+TEST(Generate, ADryRunForetellsVoxelsTrianglesAndTheFile) {
+  for (const auto& [name, options] : {std::pair<std::string, std::vector<std::string>>{"molar", {"--infill", "tcs"}},
+                                      {"torus", {"--infill", "tcs"}},
+                                      {"molar", {"--infill", "tcs", "--set", "tcs.form=sheet"}},
+                                      {"rounded_box", {"--infill", "gyroid"}},
+                                      {"molar", {"--infill", "shell"}},
+                                      {"bracket", {"--infill", "solid"}},
+                                      {"cylinder_on_box", {"--infill", "hybrid"}}}) {
+    const TempDir folder;
+    std::vector<std::string> command{"generate", asset(name), "--voxel", "0.4", "-o", folder / "a.stl"};
+    command.insert(command.end(), options.begin(), options.end());
+    run(command);
+    const json report = report_in(folder / "a.report.json");
+    const auto bytes = static_cast<double>(std::filesystem::file_size(folder / "a.stl"));
+    command.insert(command.end(), {"--dry-run", "--overwrite"});
+    const Foretold said = foretold(run(command).out);
+    EXPECT_NEAR(said.voxels * 1e6 / report["solid"]["active_voxels"].get<double>(), 1, 0.15) << name << options.back();
+    EXPECT_NEAR(said.triangles * 1e6 / report["mesh"]["triangles"].get<double>(), 1, 0.2) << name << options.back();
+    EXPECT_NEAR(said.bytes / bytes, 1, 0.2) << name << options.back();
+  }
+}
+
+/// Whatever a run does besides: it keeps to its memory, or it is refused.
+TEST(Generate, NothingTakesMoreMemoryThanItMay) {
+  const TempDir folder;
+  Mesh open = read_mesh(asset("molar")).mesh;
+  open.triangles.pop_back();
+  write_mesh(folder / "open.ply", open);
+  int ran = 0;
+  for (const auto& [model, options] : {std::pair<std::string, std::vector<std::string>>{asset("molar"), {"--fix"}},
+                                       {asset("molar"), {"--set", "print.drain_mm=2"}},
+                                       {asset("molar"), {"--picture", folder / "a.png"}},
+                                       {asset("molar"), {"--steps", folder / "steps.vdb"}},
+                                       {folder / "open.ply", {}}})
+    for (const int megabytes : {160, 270, 400}) {
+      const std::string most = std::to_string(megabytes) + "M";
+      std::vector<std::string> command{"generate",     model, "--infill",   "tcs",
+                                       "--voxel",      "0.3", "-o",         folder / "a.stl",
+                                       "--max-memory", most,  "--overwrite"};
+      command.insert(command.end(), options.begin(), options.end());
+      const Finished finished = run_program(FIBROLITE_PROGRAM, command);
+      if (finished.code == 5) continue;
+      ASSERT_EQ(finished.code, 0) << finished.err;
+      ++ran;
+      for (const json& stage : report_in(folder / "a.report.json")["stages"])
+        EXPECT_LE(stage["peak_rss_mb"].get<double>(), 1.048576 * megabytes) << command[1] << options.size() << most;
+    }
+  EXPECT_GE(ran, 5);
 }
 
 TEST(Generate, ADryRunSaysWhatTheRunWillTake) {

@@ -2,6 +2,7 @@
 // Mesh -> Solid: exact distance in a band, with a sign that survives holes and self-intersections.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,15 +22,22 @@ struct ToSolidParams {
   double inside_band_mm = 0;
   /// Of this mesh, where there is one already; else one is made.
   std::optional<WindingTree> tree{};
+  /// A mesh that overlaps itself is refused if replacing it would need more (repair_bytes()).
+  double most_bytes = std::numeric_limits<double>::infinity();
 };
+/// What it takes to replace a mesh that is open or overlaps itself by its outermost surface, all of it at once, beside
+/// the mesh: from its area. Cost: O(n).
+[[nodiscard]] double repair_bytes(const Mesh& mesh, double voxel_mm);
+/// Is it open, so that it will be replaced? Cost: O(n).
+[[nodiscard]] bool is_open(const Mesh& mesh);
 struct ToSolidResult {
   /// Interior background is -(inside_band_mm + band), or less if the body is nowhere so deep; exterior +band.
   Solid solid;
   std::vector<std::string> repairs;  ///< What had to be decided by winding number, in words; empty for a clean mesh.
 };
 /// @throws Error BadInput: the mesh encloses no volume (an open sheet, all triangles in one plane, thinner than the
-/// voxel); BadRecipe: voxel (2e-5 mm or more) or band out of range; TooLarge: more than 2^31 voxels along an axis.
-/// Cost: O(triangles + band voxels), parallel; the same bits on any number of threads.
+/// voxel); BadRecipe: voxel (2e-5 mm or more) or band out of range; TooLarge: more than 2^31 voxels along an axis, or
+/// most_bytes. Cost: O(triangles + band voxels), parallel; the same bits on any number of threads.
 [[nodiscard]] ToSolidResult to_solid(const Mesh& mesh, const ToSolidParams& params, const Context& context = {});
 
 /// The same solid a box at a time, for models whose whole band is too large for memory. Immutable, thread-safe; copies

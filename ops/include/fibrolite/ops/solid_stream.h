@@ -22,6 +22,8 @@ struct SlabPlan {
   std::vector<int> borders{};  ///< Samples along it, multiples of 8, rising: slab i from borders[i] to borders[i + 1].
   int margin_vox = 8;          ///< How far beyond its slab each is known; a multiple of 8.
   double memory_bytes = 0;     ///< What the run will need at most; more than allowed if 8 samples are too many.
+  double usual_bytes = 0;      ///< What such runs took, measured: most slabs are not the largest.
+  double allowed_bytes = 0;    ///< As asked of plan_slabs().
 };
 struct SlabNeeds {
   int axis = 2;
