@@ -13,7 +13,6 @@
 
 #include "exit_codes.h"
 #include "fibrolite/error.h"
-#include "fibrolite/file.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -72,6 +71,7 @@ Outputs::Outputs(const std::vector<fs::path>& targets, const fs::path& model, bo
                   "use --overwrite to replace it, or choose another name (a report's by --report)");
     static_cast<void>(OutputFile(target));  // throws if the folder is missing or nothing can be written there
     items_.push_back({asked, target, hidden_name(target), exists});
+    held_.emplace_back(items_.back().hidden);
     names->push_back(fs::absolute(items_.back().hidden, error).string());
     places().emplace_back(items_.back().hidden.string(), asked.string());
   }
@@ -96,7 +96,12 @@ std::vector<fs::path> Outputs::hidden() const {
 }
 
 void Outputs::commit() {
-  in_commit = true;
+  struct Committing {
+    Committing() { in_commit = true; }
+    ~Committing() { in_commit = false; }
+  };
+  const Committing committing;
+  for (HeldOutput& held : held_) held.release();
   // What is replaced keeps the hidden name until all are in place.
   std::vector<bool> kept(items_.size(), false);
   std::error_code error, ignored;
@@ -112,12 +117,11 @@ void Outputs::commit() {
         fs::remove(items_[j].target, ignored);
       }
     }
-    in_commit = false;
     throw Error(Code::Io, "the output cannot be put in place: " + error.message(), asked.string());
   }
   for (std::size_t i = 0; i < items_.size(); ++i)
     if (kept[i]) fs::remove(items_[i].hidden, ignored);
-  in_commit = false;
+  for (const Item& item : items_) sync_folder_of(item.target);
 }
 
 void Outputs::discard() noexcept {

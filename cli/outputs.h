@@ -6,10 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "fibrolite/file.h"
+
 namespace fibrolite::cli {
 
-/// Every output is checked before any work, written under a hidden name beside its target, and moved there by commit()
-/// together with the others. What was not committed is removed. One at a time.
+/// Every output is checked before any work, written beside its target without a name (under a hidden one where the file
+/// system knows no other way), and put there by commit() together with the others. What was not committed is gone. One
+/// at a time.
 class Outputs {
  public:
   /// @throws UsageError: the same file twice, or the model itself; Error Io: folder missing or not writable, file
@@ -37,6 +40,7 @@ class Outputs {
     bool existed = false;
   };
   std::vector<Item> items_;
+  std::vector<HeldOutput> held_;  // under the hidden names
 };
 
 /// A message with the outputs' own names in place of the hidden ones that they are written under.

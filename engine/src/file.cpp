@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <mutex>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -79,12 +80,143 @@ int write_all(int fd, const std::byte* data, std::size_t size) {
               error == ENOSPC || error == EDQUOT ? "free some space" : "choose another folder");
 }
 
+[[noreturn]] void fail_as_discarded(const fs::path& target) {
+  throw Error(Code::Cancelled, "the output was discarded", target.string());
+}
+
+fs::path hidden_name(const fs::path& target) {
+  static std::atomic<unsigned> counter{0};
+  std::string name = ".";
+  name += target.filename().string();
+  name += '.' + std::to_string(getpid()) + '-' + std::to_string(counter++) + ".part";
+  return folder_of(target) / name;
+}
+
+/// A file under a hidden name beside its target, until it is moved there or removed.
+class HiddenFile {
+ public:
+  HiddenFile() = default;
+  ~HiddenFile() {
+    if (char* name = slot_ == nullptr ? nullptr : slot_->name.exchange(nullptr)) {
+      ::unlink(name);
+      delete[] name;
+    }
+  }
+  HiddenFile(const HiddenFile&) = delete;
+  HiddenFile& operator=(const HiddenFile&) = delete;
+
+  /// `make` makes a file of the name that it is given and returns errno, or 0; so does this.
+  template <class Make>
+  int create(const fs::path& target, const Make& make) {
+    fs::path name;
+    int error = EEXIST;
+    while (error == EEXIST) error = make((name = hidden_name(target)).c_str());
+    std::error_code ignored;
+    if (error == 0) slot_ = register_name(fs::absolute(name, ignored).string());
+    return error;
+  }
+
+  /// Returns errno, or 0; ECANCELED if it was discarded.
+  int move_to(const fs::path& target) {
+    char* name = slot_->name.exchange(nullptr);
+    if (name == nullptr) return ECANCELED;
+    const int error = ::rename(name, target.c_str()) == 0 ? 0 : errno;
+    if (error != 0) ::unlink(name);
+    delete[] name;
+    return error;
+  }
+
+ private:
+  Slot* slot_ = nullptr;
+};
+
+/// A new file to write to, or below 0 and errno.
+int open_new(const char* name) { return ::open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666); }
+
+std::string path_of(int fd) { return "/proc/self/fd/" + std::to_string(fd); }
+
+/// A file without a name in the folder of `target`, for give_name(); below 0 where there are none.
+int open_nameless([[maybe_unused]] const fs::path& target) {
+#ifdef O_TMPFILE
+  // A name that is too long is better refused now than in the end.
+  struct stat status {};
+  if (::lstat(hidden_name(target).c_str(), &status) != 0 && errno == ENAMETOOLONG) return -1;
+  const int fd = ::open(folder_of(target).c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0666);
+  if (fd < 0 || ::access(path_of(fd).c_str(), F_OK) == 0) return fd;
+  ::close(fd);
+#endif
+  return -1;
+}
+
+/// Returns errno, or 0.
+int link_to(int fd, const char* name) {
+  return ::linkat(AT_FDCWD, path_of(fd).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
+}
+
+/// Returns errno, or 0.
+int copy_to(int fd, const char* name) {
+  const int copy = open_new(name);
+  if (copy < 0) return errno;
+  std::vector<std::byte> bytes(buffer_bytes);
+  int error = 0;
+  for (off_t at = 0; error == 0;) {
+    const ssize_t got = ::pread(fd, bytes.data(), bytes.size(), at);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) error = errno;
+    if (got <= 0) break;
+    error = write_all(copy, bytes.data(), static_cast<std::size_t>(got));
+    at += got;
+  }
+  if (error == 0 && ::fsync(copy) != 0) error = errno;
+  if (::close(copy) != 0 && error == 0) error = errno;
+  if (error != 0) ::unlink(name);
+  return error;
+}
+
+/// A whole file of open_nameless() becomes `target`. Returns errno, or 0.
+int give_name(int fd, const fs::path& target) {
+  if (link_to(fd, target.c_str()) == 0) return 0;
+  // A rename replaces an old file, a link does not.
+  HiddenFile hidden;
+  const int error = hidden.create(target, [fd](const char* name) {
+    const int linked = link_to(fd, name);
+    // What a process may do can be restricted so that it may not link, but may write.
+    return linked == 0 || linked == EEXIST ? linked : copy_to(fd, name);
+  });
+  return error == 0 ? hidden.move_to(target) : error;
+}
+
+// How often discard_uncommitted_files() was called.
+std::atomic<unsigned> discards{0};
+
+/// A target that a HeldOutput holds, and the file that was committed to it.
+struct Held {
+  fs::path target;
+  int fd = -1;
+};
+std::mutex held_mutex;
+std::vector<Held*> all_held;
+
+/// Returns whether somebody holds the target, and so has the file now.
+bool hand_over(int& fd, const fs::path& target) {
+  const std::lock_guard lock(held_mutex);
+  for (Held* held : all_held) {
+    if (held->target != target) continue;
+    if (held->fd >= 0) ::close(held->fd);
+    held->fd = std::exchange(fd, -1);
+    return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 struct OutputFile::State {
-  fs::path target, hidden;
+  fs::path target;
   int fd = -1;
-  Slot* slot = nullptr;
+  bool nameless = true;
+  HiddenFile hidden;  // if not
+  unsigned begun = discards;
   std::vector<std::byte> buffer;
 
   explicit State(const fs::path& asked) : target(followed(asked)) {
@@ -96,27 +228,22 @@ struct OutputFile::State {
     const fs::file_status status = fs::status(target, error);
     if (fs::exists(status) && !fs::is_regular_file(status))
       throw Error(Code::Io, "the output exists and is not a regular file", target.string(), "choose another name");
-    static std::atomic<unsigned> counter{0};
-    do {
-      std::string name = ".";
-      name += target.filename().string();
-      name += '.' + std::to_string(getpid()) + '-' + std::to_string(counter++) + ".part";
-      hidden = folder / name;
-      fd = ::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    } while (fd < 0 && errno == EEXIST);
-    if (fd < 0)
-      throw Error(Code::Io, "cannot write into the output folder: " + system_reason(errno), folder.string(),
-                  "choose another, or see to its permissions");
-    slot = register_name(fs::absolute(hidden, error).string());
+    fd = open_nameless(target);
+    if (fd < 0) {
+      nameless = false;
+      const int failed = hidden.create(target, [this](const char* name) {
+        fd = open_new(name);
+        return fd < 0 ? errno : 0;
+      });
+      if (failed != 0)
+        throw Error(Code::Io, "cannot write into the output folder: " + system_reason(failed), folder.string(),
+                    "choose another, or see to its permissions");
+    }
     buffer.reserve(buffer_bytes);
   }
 
   ~State() {
     if (fd >= 0) ::close(fd);
-    if (char* name = slot == nullptr ? nullptr : slot->name.exchange(nullptr)) {
-      ::unlink(name);
-      delete[] name;
-    }
   }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
@@ -162,19 +289,46 @@ void OutputFile::commit() {
   state.flush();
   // Network file systems report a full disk only here or at close().
   if (::fsync(state.fd) != 0) state.fail(errno);
+  if (discards != state.begun) fail_as_discarded(state.target);
+  if (state.nameless && hand_over(state.fd, state.target)) return;
+  int error = 0;
+  if (state.nameless && (error = give_name(state.fd, state.target)) != 0) state.fail(error);
   if (::close(std::exchange(state.fd, -1)) != 0) state.fail(errno);
-  char* name = state.slot->name.exchange(nullptr);
-  if (name == nullptr) throw Error(Code::Cancelled, "the output was discarded", state.target.string());
-  const int error = ::rename(name, state.target.c_str()) == 0 ? 0 : errno;
-  if (error != 0) ::unlink(name);
-  delete[] name;
+  if (!state.nameless) error = state.hidden.move_to(state.target);
+  if (error == ECANCELED) fail_as_discarded(state.target);
   if (error != 0) state.fail(error);
-  // The rename itself must survive a power cut; not every file system lets a
-  // folder be synced, and the data is safe.
-  if (const int folder = ::open(folder_of(state.target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); folder >= 0) {
-    ::fsync(folder);
-    ::close(folder);
+  sync_folder_of(state.target);
+}
+
+struct HeldOutput::State : Held {
+  explicit State(const fs::path& asked) : Held{followed(asked)} {
+    const std::lock_guard lock(held_mutex);
+    all_held.push_back(this);
   }
+  ~State() {
+    const std::lock_guard lock(held_mutex);
+    std::erase(all_held, this);
+    if (fd >= 0) ::close(fd);
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+};
+
+HeldOutput::HeldOutput(fs::path target) : state_(std::make_unique<State>(std::move(target))) {}
+HeldOutput::~HeldOutput() = default;
+HeldOutput::HeldOutput(HeldOutput&&) noexcept = default;
+HeldOutput& HeldOutput::operator=(HeldOutput&&) noexcept = default;
+
+void HeldOutput::release() {
+  int fd = -1;
+  {
+    const std::lock_guard lock(held_mutex);
+    fd = std::exchange(state_->fd, -1);
+  }
+  if (fd < 0) return;
+  const int error = give_name(fd, state_->target);
+  ::close(fd);
+  if (error != 0) fail_to_write(error, state_->target);
 }
 
 ScratchFile::ScratchFile(const fs::path& folder) : folder_(folder) {
@@ -214,7 +368,16 @@ void ScratchFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
   }
 }
 
+void sync_folder_of(const fs::path& file) {
+  // Not every file system lets a folder be synced.
+  if (const int folder = ::open(folder_of(file).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); folder >= 0) {
+    ::fsync(folder);
+    ::close(folder);
+  }
+}
+
 void discard_uncommitted_files() noexcept {
+  ++discards;
   for (Slot* slot = slots.load(); slot != nullptr; slot = slot->next)
     // The name is not freed: free() is not allowed in a signal handler, and the
     // process is about to end.

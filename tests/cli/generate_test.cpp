@@ -459,6 +459,22 @@ TEST(Generate, ASecondCtrlCEndsAtOnce) {
   job.expect_clean_end();
 }
 
+/// When one output is whole and waits for the others, the next is half written.
+TEST(Generate, KilledItLeavesNothing) {
+  const TempDir folder;
+  if (!has_nameless_files(folder.path())) GTEST_SKIP() << "no files without a name here";
+  Process process(FIBROLITE_PROGRAM, {"generate", asset("quadruped"), "--size", "100", "--voxel", "0.25", "--infill",
+                                      "tcs", "-o", folder / "a.vdb", "-o", folder / "a.stl"});
+  const auto two_begun = [&] {
+    const auto sizes = process.open_in(folder.path());
+    return sizes.size() > 1 && std::count(sizes.begin(), sizes.end(), 0U) == 0;
+  };
+  while (!two_begun() && !process.ended()) std::this_thread::yield();
+  process.send(SIGKILL);
+  EXPECT_EQ(process.wait(), 1000 + SIGKILL) << process.err();
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
 // ---- the other commands
 
 TEST(Partition, PartsInColourAsGridsAndInTheReport) {

@@ -10,6 +10,8 @@
 #include <string>
 
 #include "fibrolite/error.h"
+#include "fibrolite/file.h"
+#include "run_program.h"
 
 namespace fibrolite::cli {
 namespace {
@@ -64,6 +66,22 @@ TEST_F(OutputsTest, ReplaceNothingIfOneOfThemFails) {
   EXPECT_EQ(text_of(a), "old");
   EXPECT_FALSE(fs::exists(b));
   EXPECT_EQ(files(), 2);
+}
+
+TEST_F(OutputsTest, AreNotSeenBeforeAllAreWritten) {
+  if (!testing::has_nameless_files(folder)) GTEST_SKIP() << "no files without a name here";
+  write(a, "old");
+  Outputs outputs({a, b}, model, true);
+  for (const fs::path& target : {a, b}) {
+    OutputFile file(outputs.place(target));
+    file.write("new");
+    file.commit();
+  }
+  EXPECT_EQ(files(), 2);
+  outputs.commit();
+  EXPECT_EQ(text_of(a), "new");
+  EXPECT_EQ(text_of(b), "new");
+  EXPECT_EQ(files(), 3);
 }
 
 TEST_F(OutputsTest, AreGoneIfNotCommitted) {

@@ -68,6 +68,12 @@ Finished stopped(const TempDir& folder, const Command& run, std::size_t batches,
   return {code, process.out(), process.err()};
 }
 
+/// The first MB of the archive is on the disk.
+bool archive_grows(const Process& process, const TempDir& folder) {
+  const auto sizes = process.open_in(folder.path());
+  return std::any_of(sizes.begin(), sizes.end(), [](std::uintmax_t size) { return size > 0; });
+}
+
 void expect_same_report(json a, json b) {
   for (json* report : {&a, &b}) {
     for (json& stage : (*report)["stages"]) stage = stage["name"];
@@ -92,6 +98,9 @@ TEST(Resume, KilledInTheMiddleOfSlabsItEndsWithTheSameBytes) {
   const Command once = in_slabs(undisturbed, "molar.zip"), again = in_slabs(folder, "molar.zip");
   run(once.arguments);
   EXPECT_EQ(stopped(folder, again, 5, SIGKILL).code, Killed);
+  if (has_nameless_files(folder.path())) {
+    EXPECT_THAT(names_in(folder.path()), ElementsAre(".molar.zip.resume"));
+  }
   const auto layers = static_cast<int>(16 * kept(folder, again, "layers-").size());
   const std::size_t slabs = kept(folder, again, "slab_").size();
   EXPECT_LT(layers, 320);
@@ -170,11 +179,7 @@ TEST(Resume, InterruptedBeforeAnythingIsFinishedOrWithoutItNothingStays) {
     Process process(FIBROLITE_PROGRAM, again.arguments + (resume ? Arguments{"--resume"} : Arguments{}));
     // Without: as soon as the archive grows. With: as soon as there is a place to keep what is finished.
     const auto begun = [&] {
-      for (const std::string& name : names_in(folder.path()))
-        if (resume ? fs::exists(folder / name / "outputs.kept")
-                   : name.find(".part") != std::string::npos && name.find(".new.sl1") != std::string::npos)
-          return true;
-      return false;
+      return resume ? fs::exists(kept_folder(folder, again) / "outputs.kept") : archive_grows(process, folder);
     };
     while (!begun() && !process.ended()) std::this_thread::yield();
     process.send(SIGINT);
@@ -182,6 +187,16 @@ TEST(Resume, InterruptedBeforeAnythingIsFinishedOrWithoutItNothingStays) {
     EXPECT_THAT(process.err(), HasSubstr("nothing was written"));
     EXPECT_THAT(names_in(folder.path()), IsEmpty());
   }
+}
+
+TEST(Resume, KilledWithoutItNothingStays) {
+  const TempDir folder;
+  if (!has_nameless_files(folder.path())) GTEST_SKIP() << "no files without a name here";
+  Process process(FIBROLITE_PROGRAM, whole(folder, "y.sl1").arguments);
+  while (!archive_grows(process, folder) && !process.ended()) std::this_thread::yield();
+  process.send(SIGKILL);
+  EXPECT_EQ(process.wait(), Killed) << process.err();
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
 }
 
 TEST(Resume, OtherWorkIsRefusedAndNothingIsLost) {

@@ -8,11 +8,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "models.h"
@@ -22,6 +24,17 @@ namespace fibrolite::testing {
 inline std::string content(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Whether files there can be without a name. Where they cannot, a killed process leaves what it was writing.
+inline bool has_nameless_files([[maybe_unused]] const std::filesystem::path& folder) {
+#ifdef O_TMPFILE
+  const int fd = open(folder.c_str(), O_TMPFILE | O_RDWR, 0600);
+  if (fd >= 0) close(fd);
+  return fd >= 0;
+#else
+  return false;
+#endif
 }
 
 /// A started program. stdout and stderr go to files, so that it never waits for a reader.
@@ -51,6 +64,19 @@ class Process {
     if (!ended_) waitpid(pid_, &status_, 0);
     ended_ = true;
     return WIFEXITED(status_) ? WEXITSTATUS(status_) : 1000 + WTERMSIG(status_);
+  }
+  /// Sizes of the files that it has open in a folder, those without a name among them.
+  [[nodiscard]] std::vector<std::uintmax_t> open_in(const std::filesystem::path& folder) const {
+    std::vector<std::uintmax_t> sizes;
+    std::error_code error;
+    const std::filesystem::path mine = "/proc/" + std::to_string(pid_) + "/fd";
+    for (const auto& entry : std::filesystem::directory_iterator(mine, error)) {
+      const std::filesystem::path file = std::filesystem::read_symlink(entry.path(), error);
+      if (error || file.parent_path() != folder) continue;
+      const std::uintmax_t size = std::filesystem::file_size(entry.path(), error);
+      if (!error) sizes.push_back(size);
+    }
+    return sizes;
   }
   [[nodiscard]] std::string out() const { return content(folder_ / "out"); }
   [[nodiscard]] std::string err() const { return content(folder_ / "err"); }

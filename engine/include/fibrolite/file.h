@@ -11,8 +11,10 @@
 
 namespace fibrolite {
 
-/// Writes to a hidden file beside `target`; commit() flushes it to disk and renames it over the target. If it is
-/// destroyed uncommitted, nothing stays behind. Buffered. Not thread-safe.
+/// Writes to a file without a name in the target's folder; commit() flushes it to disk and makes it the target. Until
+/// then it is gone with this object or with the process, however that ends. Where the system has no such files (outside
+/// of Linux, and on some network file systems) it has a hidden name meanwhile, which stays if the process is killed.
+/// Buffered. Not thread-safe.
 class OutputFile {
  public:
   /// @throws Error Io: folder missing or not writable.
@@ -28,6 +30,24 @@ class OutputFile {
   void overwrite(std::uint64_t offset, std::span<const std::byte> bytes);
   /// @throws Error Io; Cancelled, if discard_uncommitted_files() came first.
   void commit();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// While it lives, an OutputFile that is committed to `target` keeps no name until release(): so several outputs
+/// appear together. Destroyed before, there is none. Where files cannot be without a name, it has its own from
+/// commit() on.
+class HeldOutput {
+ public:
+  explicit HeldOutput(std::filesystem::path target);
+  ~HeldOutput();
+  HeldOutput(HeldOutput&&) noexcept;
+  HeldOutput& operator=(HeldOutput&&) noexcept;
+
+  /// Nothing happens if nothing was committed; sync_folder_of() is the caller's. @throws Error Io.
+  void release();
 
  private:
   struct State;
@@ -54,6 +74,9 @@ class ScratchFile {
   int fd_ = -1;
   std::uint64_t size_ = 0;
 };
+
+/// Names that were given or changed in a file's folder survive a power cut from here on, where the system can do so.
+void sync_folder_of(const std::filesystem::path& file);
 
 /// Remove every uncommitted file of this process; for a signal handler's orderly end.
 void discard_uncommitted_files() noexcept;
