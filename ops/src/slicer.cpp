@@ -8,11 +8,8 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <limits>
-#include <mutex>
 #include <new>
 #include <optional>
-#include <shared_mutex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,6 +18,7 @@
 #include "fibrolite/ops/loads.h"
 #include "fibrolite/ops/text.h"
 #include "fibrolite/to_solid.h"
+#include "slab_turns.h"
 
 namespace fibrolite {
 namespace {
@@ -33,16 +31,14 @@ struct Slicer::Filled {
   SliceGrid grid;
   SliceParams slice;
   Report report;
-  Shape shape;  ///< All of it, or of the slab that was asked for last.
-  // If there are slabs: who asks holds `use` shared, who makes another slab alone.
-  std::optional<SolidStream> stream;
-  std::shared_mutex use;
-  std::size_t slab = std::numeric_limits<std::size_t>::max();
+  Shape shape;                        ///< All of it, or of the slab that is there.
+  std::optional<SolidStream> stream;  ///< If there are slabs.
+  SlabTurns turns;
 
   double cut(int layer, const PixelRange& tile, std::uint8_t* rows, std::ptrdiff_t stride, const Context& context) {
     if (!stream) return slice_into(rows, stride, tile, shape, grid, layer, slice, context);
     // A thread that waits for tasks of ours takes up others meanwhile. If the host asks for layers in such tasks, one
-    // of them would then wait for `use`, which its own thread holds.
+    // of them would then wait for the slab that its own thread uses or makes.
     return tbb::this_task_arena::isolate([&] { return cut_slab(layer, tile, rows, stride, context); });
   }
 
@@ -50,18 +46,12 @@ struct Slicer::Filled {
   double cut_slab(int layer, const PixelRange& tile, std::uint8_t* rows, std::ptrdiff_t stride,
                   const Context& context) {
     const std::size_t wanted = stream->slab_at(grid.middle(layer)[stream->plan().axis]);
-    for (;;) {
-      {
-        const std::shared_lock lock(use);
-        if (slab == wanted) return slice_into(rows, stride, tile, shape, grid, layer, slice, context);
-      }
-      const std::unique_lock lock(use);
-      if (slab == wanted) continue;
-      slab = std::numeric_limits<std::size_t>::max();
+    const auto make = [&] {
       shape = {};  // before the next takes its memory
       shape = stream->printed(stream->slab(wanted, context), context);
-      slab = wanted;
-    }
+    };
+    const auto use = [&] { return slice_into(rows, stride, tile, shape, grid, layer, slice, context); };
+    return turns.with(wanted, make, use, context);
   }
 };
 

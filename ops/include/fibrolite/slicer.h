@@ -95,7 +95,8 @@ int fibrolite_job_layers(const fibrolite_job* job, fibrolite_layers* layers);
  * those of the whole layer at that place. `area_mm2` gets the tile's material in mm2, before it is rounded to 255
  * steps; it may be NULL. Any number of threads may ask at once, for the same layer or others, tasks of TBB among them;
  * one call alone uses all cores too. With max_memory_bytes who asks for another slab waits for those at work on this
- * one, and the call may also fail with FIBROLITE_TOO_LARGE. After FIBROLITE_CANCELLED the rows are part done. */
+ * one; who asks for the slab that is there goes first, as long as making it took, then who waited longest. The call may
+ * also fail with FIBROLITE_TOO_LARGE. After FIBROLITE_CANCELLED the rows are part done. */
 int fibrolite_job_tile(const fibrolite_job* job, int layer, int x0, int y0, int width, int height, uint8_t* rows,
                        size_t stride, double* area_mm2);
 /** From any thread, a signal handler or `progress`, at any time: what runs returns FIBROLITE_CANCELLED within a second,
@@ -134,7 +135,8 @@ struct SlicerParams {
   double max_memory_bytes = std::numeric_limits<double>::infinity();
 };
 /// A filled model, ready for any layer. Cheap to copy; everything may be called from several threads at once. In slabs
-/// whoever asks for another slab waits for those at work on this one, so layers are best asked for in order.
+/// whoever asks for another slab waits for those at work on this one, so layers are best asked for in order; who asks
+/// for the one that is there goes first, as long as making it took, then who waited longest.
 class Slicer {
  public:
   /// Prepares and fills: the same layers as `fibrolite slice` makes of the same numbers.
