@@ -54,9 +54,11 @@ Run measure_floor(const Case& c, const Options& options) {
 
 Run measure(const Case& c, const Options& options) {
   if (!c.floor_option.empty()) return measure_floor(c, options);
-  const fs::path solid = options.out / "solid.stl", report = options.out / "report.json", log = options.out / "log.txt";
+  const bool slices = c.layer_mm > 0;
+  const fs::path solid = options.out / (slices ? "solid.zip" : "solid.stl"), report = options.out / "report.json",
+                 log = options.out / "log.txt";
   std::vector<std::string> command{options.bin / "fibrolite",
-                                   "generate",
+                                   slices ? "slice" : "generate",
                                    c.model,
                                    "-o",
                                    solid,
@@ -73,6 +75,7 @@ Run measure(const Case& c, const Options& options) {
                                    "--overwrite",
                                    "--quiet"};
   for (const std::string& key : c.set) command.insert(command.end(), {"--set", key});
+  if (slices) command.insert(command.end(), {"--layer", std::to_string(c.layer_mm), "--pixel", "0.05"});
   if (!c.max_memory.empty()) command.insert(command.end(), {"--max-memory", c.max_memory});
   const int threads = c.threads > 0 ? c.threads : options.threads;
   if (threads > 0) command.insert(command.end(), {"--threads", std::to_string(threads)});
@@ -81,6 +84,10 @@ Run measure(const Case& c, const Options& options) {
   fs::remove(solid);
   if (run.program.exit_code != 0) {
     run.failure = "exit " + std::to_string(run.program.exit_code) + ": " + first_line(log);
+    return run;
+  }
+  if (slices) {
+    read_slices(run, nlohmann::json::parse(std::ifstream(report)));
     return run;
   }
   run.floor = fibrolite::bench::run(

@@ -105,10 +105,17 @@ std::vector<Case> suite(const SuiteParams& params) {
     Case alone = peer;
     alone.beside = alone.name;
     alone.name += " alone";
-    alone.repeats = 1;
     alone.threads = 1;
     alone.goals = {.speed_up = 1.8};
     cases.push_back(alone);
+    Case slices{
+        .name = "slices 0.2", .model = main_model, .voxel_mm = 0.2, .infill = "tcs", .goals = {}, .layer_mm = 0.2};
+    cases.push_back(slices);
+    slices.beside = slices.name;
+    slices.name += " alone";
+    slices.threads = 1;
+    slices.goals = {.speed_up = 1.8};
+    cases.push_back(slices);
     for (const double voxel_mm : {0.2, 0.1}) {
       cases.push_back({.name = "band " + label(voxel_mm),
                        .model = main_model,
@@ -139,6 +146,14 @@ std::vector<Case> suite(const SuiteParams& params) {
                    .voxel_mm = 0.4,
                    .goals = {.wall_s = 90, .partition_s = 30}});
   std::ranges::move(costs(main_model, params), std::back_inserter(cases));
+  // 6000 voxels on the long side, 5002 layers: some ten minutes.
+  cases.push_back({.name = "slices 300 mm",
+                   .model = main_model,
+                   .size_mm = 300,
+                   .voxel_mm = 0.05,
+                   .goals = {.peak_rss_mb = 4096 * 1.048576},
+                   .max_memory = "4G",
+                   .layer_mm = 0.05});
   for (const char* infill : {"tcs", "mfs", "solid"}) {
     cases.push_back({.name = infill, .model = main_model, .voxel_mm = 0.25, .infill = infill, .goals = {}});
   }

@@ -22,8 +22,9 @@ struct Goals {
   std::optional<double> checks_times{};   ///< CPU time of `print checks` per active voxel.
   std::optional<double> compute_times{};  ///< Wall time of the compute stages, those that decide the parts left out.
   std::optional<double> peak_times{};     ///< Peak memory.
-  std::optional<double> speed_up{};       ///< At least: wall time of `realize` and `surface` here over theirs there.
-  std::optional<double> eager_times{};    ///< At least: OpenVDB's tools' wall time over the compute stages there.
+  /// At least: wall time of `realize` and `surface`, or of `layers`, here over theirs there.
+  std::optional<double> speed_up{};
+  std::optional<double> eager_times{};  ///< At least: OpenVDB's tools' wall time over the compute stages there.
   // Of fibrolite-floor --band:
   std::optional<double> band_speed_up{};  ///< At least: meshToLevelSet's wall time over to_solid()'s.
   std::optional<double> wide_times{};     ///< Wall time of to_solid() with 1 mm inside over that with the band alone.
@@ -40,6 +41,7 @@ struct Case {
   std::string beside{};            ///< An earlier case to compare with.
   std::string max_memory{};        ///< As `--max-memory` takes it.
   int threads = 0;                 ///< 0: as all the others.
+  double layer_mm = 0;             ///< Above 0: `slice` to a .zip, layers so high, pixels of 0.05 mm; no floor.
   /// Not the program, but fibrolite-floor with this option: "--band" (the model to its band, beside OpenVDB's) or
   /// "--eager" (all of it by OpenVDB's tools, beside an earlier case).
   std::string floor_option{};

@@ -27,13 +27,29 @@ std::string number(double value, int decimals) {
 
 }  // namespace
 
-void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& floor) {
+namespace {
+
+void read_stages(Run& run, const nlohmann::json& report) {
   for (const auto& stage : report.at("stages")) {
     run.stages.push_back({.name = stage.at("name"),
                           .wall_s = stage.at("wall_s"),
                           .cpu_s = stage.value("cpu_s", 0.0),
                           .peak_rss_mb = stage.at("peak_rss_mb")});
   }
+}
+
+}  // namespace
+
+void read_slices(Run& run, const nlohmann::json& report) {
+  read_stages(run, report);
+  for (const auto& plate : report.at("slices").at("plates")) run.layers += plate.at("layers").get<double>();
+  for (const Stage& stage : run.stages)
+    if (stage.name == "layers") run.layers_s = run.parallel_s = stage.wall_s;
+  run.active_voxels = report.at("solid").at("active_voxels");
+}
+
+void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& floor) {
+  read_stages(run, report);
   double all_cpu_s = 0, joints_cpu_s = 0;
   for (const Stage& stage : run.stages) {
     all_cpu_s += stage.cpu_s;
@@ -97,7 +113,11 @@ void print_row(const Case& c, const Run& run) {
                 run.failure.c_str());
     return;
   }
-  if (run.eager_s > 0) {
+  if (run.layers > 0) {
+    std::printf("%-14s %-18s %6g %6g | %7.2f %7.2f | %.0f layers in %.2f s, %.3f s each; peak %.0f MB\n",
+                c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.program.wall_s, run.program.cpu_s, run.layers,
+                run.layers_s, run.layers_s / run.layers, run.program.peak_rss_mb);
+  } else if (run.eager_s > 0) {
     std::printf("%-14s %-18s %6g %6g | OpenVDB's tools %.2f s, of which the shell's offset %.2f s; peak %.0f MB\n",
                 c.name.c_str(), model.c_str(), c.size_mm, c.voxel_mm, run.eager_s, run.offset_s, run.floor.peak_rss_mb);
   } else if (run.band_s > 0) {
@@ -132,7 +152,9 @@ std::vector<std::string> judge(const Case& c, const Run& run, bool& met) {
   one("partition and verification s", c.goals.partition_s, run.partition_s);
   one("peak MB", c.goals.peak_rss_mb, run.program.peak_rss_mb);
   one("joints / all stages, CPU", c.goals.joints_share, run.joints_share);
-  if (run.beside_cpu_s > 0 && run.eager_s > 0)
+  if (run.layers > 0 && run.beside_parallel_s > 0)
+    at_least("layers, time alone / " + c.beside, c.goals.speed_up, run.parallel_s / run.beside_parallel_s);
+  else if (run.beside_cpu_s > 0 && run.eager_s > 0)
     at_least("OpenVDB's tools / " + c.beside, c.goals.eager_times, run.eager_s / run.beside_compute_s);
   else if (run.beside_cpu_s > 0) {
     const std::string over = " / " + c.beside;
@@ -163,6 +185,17 @@ nlohmann::json to_json(const Case& c, const Run& run) {
     return json;
   }
   json["threads"] = c.threads;
+  if (run.layers > 0) {
+    json["slices"] = {{"layers", run.layers},
+                      {"layers_s", run.layers_s},
+                      {"wall_s", run.program.wall_s},
+                      {"cpu_s", run.program.cpu_s},
+                      {"peak_rss_mb", run.program.peak_rss_mb}};
+    bool met = true;
+    json["goals"] = judge(c, run, met);
+    json["met"] = met;
+    return json;
+  }
   if (!c.floor_option.empty()) {
     if (run.eager_s > 0)
       json["eager"] = {{"eager_s", run.eager_s}, {"offset_s", run.offset_s}, {"peak_rss_mb", run.floor.peak_rss_mb}};

@@ -26,8 +26,9 @@ struct Run {
   double realize_cpu_s = 0, checks_cpu_s = 0;
   double active_voxels = 0, triangles = 0;
   double floor_compute_s = 0, floor_compute_cpu_s = 0;
-  double parallel_s = 0;                           ///< Wall time of `realize` and `surface`.
+  double parallel_s = 0;                           ///< Wall time of `realize` and `surface`, or of `layers`.
   double level_set_s = 0, band_s = 0, wide_s = 0;  ///< Of fibrolite-floor --band.
+  double layers = 0, layers_s = 0;                 ///< Of slices: how many, and wall time of that stage.
   double eager_s = 0, offset_s = 0;                ///< Of fibrolite-floor --eager; the shell's offset alone.
   // Of the case to compare with; 0: none was run.
   double beside_cpu_s = 0, beside_realize = 0, beside_checks = 0, beside_compute_s = 0, beside_parallel_s = 0,
@@ -43,6 +44,8 @@ struct Run {
 /// Fill in what the program's report and the floor's answer say.
 void read_report(Run& run, const nlohmann::json& report, const nlohmann::json& floor);
 
+/// The same of a run of `slice`, which has no floor.
+void read_slices(Run& run, const nlohmann::json& report);
 /// The same of what `fibrolite-floor --band` says.
 void read_band(Run& run, const nlohmann::json& band);
 /// And of what `fibrolite-floor --eager` says.
