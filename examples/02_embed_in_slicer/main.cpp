@@ -181,7 +181,7 @@ int main(int argc, char** argv) try {
   const double solid_mm3 = slicer.report().solid.volume_mm3;
   std::cout << slicer.grid().layers << " layers of " << slicer.grid().width << " x " << slicer.grid().height
             << " pixels; volume by layers " << volume_mm3 << " mm3, by the solid " << solid_mm3 << " mm3\n";
-  return std::abs(volume_mm3 / solid_mm3 - 1) < 0.01 ? 0 : 1;
+  return std::abs(volume_mm3 / solid_mm3 - 1) < 0.005 ? 0 : 1;
 } catch (const fibrolite::Error& error) {
   std::cerr << error.what() << '\n';
   return 1;
